@@ -8,7 +8,7 @@ use halflight_core::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use halflight_core::light::EmissionSampler;
 use halflight_core::photon::Photons;
 use halflight_core::transport::bidirectional::camera_paths::{CameraPaths, Connections};
-use halflight_core::transport::bidirectional::light_pass::{LightPass, ROOM, TaskOutput};
+use halflight_core::transport::bidirectional::light_pass::{LightPass, TaskOutput, VERTICES_PER_TASK};
 use halflight_core::transport::bidirectional::merge_photons::{MergeRadii, Merging};
 use halflight_core::transport::bidirectional::mis::Counts;
 use halflight_core::transport::bidirectional::reference::{LightPath, Reference};
@@ -43,8 +43,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let radii =
             (merges % 2 > 0).then_some(MergeRadii { radii, light_paths: counts.light_paths, emphasis: 1.0 });
 
-        let mut vertices = vec![LightVertex::default(); ROOM];
-        let (mut splats, mut output) = (vec![Splat::default(); ROOM], TaskOutput::default());
+        let mut vertices = vec![LightVertex::default(); VERTICES_PER_TASK];
+        let (mut splats, mut output) = (vec![Splat::default(); VERTICES_PER_TASK], TaskOutput::default());
         let footprint = LightPass::<All>::scratch().or(CameraPaths::<All>::scratch(connections));
         let mut scratch = lines(footprint);
         let pass = LightPass::new(context, &emission, settings, counts, radii);
@@ -53,7 +53,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
             .expect("the footprint was granted");
 
         let reference = Reference::new(context, &emission, settings, counts, radii);
-        let (mut paths, mut stored) = (vec![LightPath::default(); light_paths], vec![(0, 0); ROOM]);
+        let mut paths = vec![LightPath::default(); light_paths];
+        let mut stored = vec![(0, 0); VERTICES_PER_TASK];
         let count = reference.light_paths(sample, &mut arena(&mut scratch), &mut paths, &mut stored);
         let count = count.expect("the footprint was granted");
         let is_stored = connections > 0 || radii.is_some();
@@ -84,7 +85,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
             photons.as_mut_slice()[i] = vertex.photon(&context, i as u32);
         }
         let photons = photons.build(if radii.is_some() { vertices.len() } else { 0 });
-        let merging = radii.map(|radii| Merging { photons: &photons, vertices, radii });
+        let merging = radii.map(|radii| Merging { photons, vertices, radii });
         let shown = if connections > 0 { vertices } else { &[] };
         let connected = Connections { vertices: shown, count: connections };
         let camera_paths = CameraPaths::new(context, &emission, settings, counts, connected);

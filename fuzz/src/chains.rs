@@ -7,8 +7,8 @@ use halflight_core::bsdf::All;
 use halflight_core::film::{PIXELS_PER_TILE, Splat, Tile};
 use halflight_core::light::{EmissionSampler, luminance};
 use halflight_core::transport::SceneContext;
+use halflight_core::transport::metropolis::bootstrap::{Bootstrap, CANDIDATES, Lengths};
 use halflight_core::transport::metropolis::chain::{Chains, ChainsOutput, room};
-use halflight_core::transport::metropolis::look::{CANDIDATES, Lengths, Look};
 use halflight_core::transport::metropolis::split::{MAX_SEGMENTS, Split};
 use halflight_core::transport::metropolis::target::{PrimarySpace, Target};
 
@@ -43,22 +43,22 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let target = Target::<All>::new(context, &emission, settings, split, space);
         let weights = input.arbitrary::<[u8; 4]>()?;
         let lengths = Lengths::new(target.lengths(), |segments| f64::from(weights[segments as usize % 4]));
-        let look = Look::new(target, lengths, settings.seed, sample);
+        let bootstrap = Bootstrap::new(target, lengths, settings.seed, sample);
 
         let mut densities = vec![0.0; 1 + usize::from(kind) % (CANDIDATES / 2)];
         let mutations = 1 + usize::from(mutations) % MUTATIONS;
         let mut scratch = lines(Chains::<All>::scratch(mutations));
-        look.run(0, &mut arena(&mut scratch), &mut densities).expect("the footprint was granted");
+        bootstrap.run(0, &mut arena(&mut scratch), &mut densities).expect("the footprint was granted");
         assert!(densities.iter().all(|density| *density >= 0.0 && density.is_finite()), "{densities:?}");
         let mut starts = vec![0; 1 + usize::from(chains) % CHAINS];
-        let mean = look.choose(&densities, &mut starts);
+        let mean = bootstrap.choose(&densities, &mut starts);
         if mean == 0.0 {
             return Ok(());
         }
         check_starts(&densities, &starts);
 
         let mut splats = vec![Splat { pixel: 0, radiance: [0.0; 3] }; room(mutations)];
-        let chains = Chains::new(look, (settings.seed, sample), pixels, mutations as u32, 1.0);
+        let chains = Chains::new(bootstrap, (settings.seed, sample), pixels, mutations as u32, 1.0);
         let mut output = ChainsOutput::default();
         chains
             .run(0, &starts, &mut arena(&mut scratch), &mut splats, &mut output)

@@ -8,7 +8,7 @@ use halflight_core::light::EmissionSampler;
 use halflight_core::photon::Photons;
 use halflight_core::scene::{PointLight, Scene};
 use halflight_core::transport::bidirectional::camera_paths::{CameraPaths, Connections};
-use halflight_core::transport::bidirectional::light_pass::{LightPass, ROOM, TaskOutput};
+use halflight_core::transport::bidirectional::light_pass::{LightPass, TaskOutput, VERTICES_PER_TASK};
 use halflight_core::transport::bidirectional::merge_photons::{MergeRadii, Merging};
 use halflight_core::transport::bidirectional::mis::Counts;
 use halflight_core::transport::bidirectional::reference::{LightPath, Reference};
@@ -78,10 +78,10 @@ fn compare(scene: &Scene, connections: u32, merge_radius: Option<f64>, change: C
         let photons = photons.build(0);
         let scratch = LightPass::<All>::scratch().or(CameraPaths::<All>::scratch(connections));
         let mut scratch = TestArena::new(scratch);
-        let mut vertices = vec![LightVertex::default(); ROOM];
-        let (mut splats, mut output) = (vec![Splat::default(); ROOM], TaskOutput::default());
+        let mut vertices = vec![LightVertex::default(); VERTICES_PER_TASK];
+        let (mut splats, mut output) = (vec![Splat::default(); VERTICES_PER_TASK], TaskOutput::default());
         let mut paths = vec![LightPath::default(); LIGHT_PATHS];
-        let mut stored = vec![(0, 0); ROOM];
+        let mut stored = vec![(0, 0); VERTICES_PER_TASK];
         let mut compared = Compared::default();
         for sample in 0..SAMPLES {
             splats.fill(Splat::default());
@@ -110,7 +110,7 @@ fn compare(scene: &Scene, connections: u32, merge_radius: Option<f64>, change: C
 
             let vertices = &vertices[..count * usize::from(connections > 0)];
             let stored = &stored[..vertices.len()];
-            let merging = radii.map(|radii| Merging { photons: &photons, vertices, radii });
+            let merging = radii.map(|radii| Merging { photons, vertices, radii });
             let camera_paths = CameraPaths::new(
                 context,
                 &emission,

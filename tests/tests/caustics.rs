@@ -13,7 +13,9 @@ use halflight_core::memory::Arena;
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material, Scene, Surface};
-use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, GuideSample, PATHS, ROOM};
+use halflight_core::transport::caustics::tracer::{
+    CausticPhotonTracer, GuideSample, PATHS_PER_TASK, PHOTONS_PER_TASK,
+};
 use halflight_core::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings, RadiusSchedule, UNLIMITED};
 use halflight_core::{Level, Rgb};
@@ -57,9 +59,9 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     let mut scratch_memory = TestArena::new(paths.or(CausticPhotonTracer::<All>::scratch()));
     let mut scratch = scratch_memory.arena();
     let mut film_memory = TestArena::new(Film::footprint(SIZE, SIZE));
-    let mut photon_memory = [0, 1].map(|_| TestArena::new(Photons::footprint(tasks * ROOM)));
+    let mut photon_memory = [0, 1].map(|_| TestArena::new(Photons::footprint(tasks * PHOTONS_PER_TASK)));
     let one = |seed: u32| {
-        let paths = (tasks * PATHS) as u32;
+        let paths = (tasks * PATHS_PER_TASK) as u32;
         let discs = RadiusSchedule::new((scene, &bvh), [SIZE; 2], level).of_pixels(pixels);
         let shot = PhotonTracerSettings { keep: PhotonFilter::Caustic, seed, paths, max_depth };
         let shooter = CausticPhotonTracer::<All>::new(
@@ -73,12 +75,12 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
         let [even, odd] = &mut photon_memory;
         let mut map = 0;
         let maps = [even.arena(), odd.arena()].map(|mut arena| {
-            let mut photons = Photons::new(tasks * ROOM, &mut arena).unwrap();
-            for (task, out) in photons.as_mut_slice().chunks_mut(ROOM).enumerate() {
+            let mut photons = Photons::new(tasks * PHOTONS_PER_TASK, &mut arena).unwrap();
+            for (task, out) in photons.as_mut_slice().chunks_mut(PHOTONS_PER_TASK).enumerate() {
                 assert_eq!(shooter.run(task, map, &mut scratch, out).unwrap().dropped.total(), 0);
             }
             map += 1;
-            photons.build(tasks * ROOM)
+            photons.build(tasks * PHOTONS_PER_TASK)
         });
         let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth };
         let tracer = PathIntegrator::<All>::new(scene, &bvh, &lights, settings, level);
@@ -439,7 +441,7 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     let shot = PhotonTracerSettings {
         keep: PhotonFilter::Caustic,
         seed: 3,
-        paths: (TASKS * PATHS) as u32,
+        paths: (TASKS * PATHS_PER_TASK) as u32,
         max_depth: 3,
     };
     let discs = RadiusSchedule::new((&scene, &bvh), [SIZE; 2], level);
@@ -450,7 +452,7 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     let look = |emission, map, worth: &mut GuideStats, scratch: &mut Arena| {
         let shooter = shooter(emission);
         for task in 0..TASKS / 2 {
-            let mut finds = [GuideSample::default(); PATHS];
+            let mut finds = [GuideSample::default(); PATHS_PER_TASK];
             shooter.look(task, map, scratch, &mut finds).unwrap();
             finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
         }
@@ -468,7 +470,7 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
         let start = Instant::now();
         let shooter = shooter(emission);
         for (map, task) in (2..2 + MAPS).flat_map(|map| (0..TASKS).map(move |task| (map, task))) {
-            let mut photons = [Photon::NONE; ROOM];
+            let mut photons = [Photon::NONE; PHOTONS_PER_TASK];
             rays += shooter.run(task, map, &mut scratch, &mut photons).unwrap().rays;
             let left = photons.iter().filter(|photon| photon.position().is_finite());
             left.for_each(|photon| (useful, power) = (useful + 1, power + f64::from(photon.power().x)));

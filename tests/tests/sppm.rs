@@ -10,7 +10,7 @@ use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::{Camera, Material, PointLight, Scene};
 use halflight_core::transport::UNLIMITED;
 use halflight_core::transport::photon_mapping::deposit::{
-    PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
+    PATHS_PER_TASK, PhotonFilter, PhotonTracer, PhotonTracerSettings, VERTICES_PER_TASK,
 };
 use halflight_core::{Level, Rgb};
 use halflight_tests::memory::{TestArena, with_structures};
@@ -32,14 +32,14 @@ fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
         let settings = PhotonTracerSettings {
             keep: PhotonFilter::Reflected,
             seed: 1,
-            paths: (tasks * PATHS) as u32,
+            paths: (tasks * PATHS_PER_TASK) as u32,
             max_depth: UNLIMITED,
         };
         let shooter = PhotonTracer::<All>::new(scene, bvh, lights, &emission, settings, Level::detect());
         let mut scratch_memory = TestArena::new(PhotonTracer::<All>::scratch());
         let mut scratch = scratch_memory.arena();
-        let mut all = vec![Photon::NONE; tasks * ROOM];
-        for (task, out) in all.chunks_mut(ROOM).enumerate() {
+        let mut all = vec![Photon::NONE; tasks * VERTICES_PER_TASK];
+        for (task, out) in all.chunks_mut(VERTICES_PER_TASK).enumerate() {
             let counters = shooter.run(task, 0, &mut scratch, out).unwrap();
             assert_eq!(counters.dropped.total(), 0);
         }
@@ -75,7 +75,7 @@ fn stored_photons_carry_the_power_that_surfaces_reflect() {
         let lost = (1.0 + kept) * 0.0033;
         let ratio = power / expected;
         assert!(ratio < 1.01 && ratio > 0.99 - lost, "{reflectance}: {ratio}");
-        assert!(photons.len() < 64 * ROOM * 4 / 5, "there is room left: {}", photons.len());
+        assert!(photons.len() < 64 * VERTICES_PER_TASK * 4 / 5, "there is room left: {}", photons.len());
     }
 }
 
@@ -106,7 +106,7 @@ fn a_limit_of_memory_makes_fewer_photons_with_the_same_light() {
     };
     let (few, many) = (sppm(&scene, 64, 2, |_| ()), sppm(&scene, 64, 32, |_| ()));
     assert_eq!((bytes(&few), few.memory_peak), (bytes(&many), many.memory_peak));
-    assert!(bytes(&few) >= Photons::footprint(16 * ROOM).bytes());
+    assert!(bytes(&few) >= Photons::footprint(16 * VERTICES_PER_TASK).bytes());
     let tight = few.memory_peak - bytes(&few) / 2;
     let less = sppm(&scene, 64, 32, |s| s.memory = Some(tight));
     assert!(less.memory_peak <= tight && bytes(&less) < bytes(&few));

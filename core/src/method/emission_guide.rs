@@ -12,12 +12,14 @@ use super::{PhotonMapStore, RenderContext};
 use crate::bsdf::Features;
 use crate::light::{EmissionSampler, GuideStats};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
-use crate::transport::photon_mapping::deposit::{PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings};
+use crate::transport::photon_mapping::deposit::{
+    PATHS_PER_TASK, PhotonFilter, PhotonTracer, PhotonTracerSettings,
+};
 use crate::transport::photon_mapping::visible_points::{VisiblePointSampler, VisiblePoints};
 
 /// Light paths of each pilot, the map that those of the first belong to, which no sample has, and the most
 /// pilots after it.
-const PILOT: usize = 16 * PATHS;
+const PILOT: usize = 16 * PATHS_PER_TASK;
 const FIRST_MAP: u32 = 0x7fff_fff0;
 const MOST_PILOTS: u32 = 3;
 
@@ -247,7 +249,7 @@ impl<'p, 'a> Pilot<'p, 'a> {
         let tracer = PhotonTracer::<F>::new(scene, bvh, lights, emission, *settings, level);
         cells.fill(0);
         powers.fill(0.0);
-        let pieces = cells.chunks_mut(PATHS).zip(powers.chunks_mut(PATHS));
+        let pieces = cells.chunks_mut(PATHS_PER_TASK).zip(powers.chunks_mut(PATHS_PER_TASK));
         let passed = executor.pass(pieces, |task, (cells, powers), worker| {
             tracer.trace_visible((task, FIRST_MAP + number), *points, &mut worker.scratch, &mut |photon| {
                 // All photons of a path come from one cell.

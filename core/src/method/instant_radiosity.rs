@@ -16,7 +16,7 @@ use crate::findings::{Finding, Findings, Value};
 use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::instant_radiosity::light_pass::{
-    LightPass, PATHS, ROOM, SetOutput, has_hidden_caustics,
+    LightPass, PATHS_PER_TASK, SetOutput, VERTICES_PER_TASK, has_hidden_caustics,
 };
 use crate::transport::instant_radiosity::lighting::VirtualLighting;
 use crate::transport::instant_radiosity::lights::{VirtualLight, lit_area};
@@ -86,7 +86,7 @@ pub struct InstantRadiosity<'a, F> {
     context: RenderContext<'a>,
     paths: PathTracing<'a, F>,
     emission: EmissionSampler<'a>,
-    /// Room for [`ROOM`] virtual lights of each set, and the outcome of its task.
+    /// Room for [`VERTICES_PER_TASK`] virtual lights of each set, and the outcome of its task.
     lights: &'a mut [VirtualLight],
     outputs: &'a mut [SetOutput],
     /// Splats of each set, and of the sample in the order of the film; none where nothing needs them.
@@ -111,9 +111,9 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
 
     /// Memory of `sets` of virtual lights.
     fn footprint(sets: usize, has_splats: bool) -> Footprint {
-        let splats = if has_splats { sets * PATHS } else { 0 };
+        let splats = if has_splats { sets * PATHS_PER_TASK } else { 0 };
         Footprint::default()
-            .slice::<VirtualLight>(sets * ROOM)
+            .slice::<VirtualLight>(sets * VERTICES_PER_TASK)
             .slice::<SetOutput>(sets)
             .slice::<Splat>(splats)
     }
@@ -146,12 +146,12 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         };
         let picture = slice("splats", pixels, memory)?;
         let wanted = settings.light_paths.map_or(context.pixels() / each, |paths| paths as usize);
-        let wanted = if all.is_empty() { 0 } else { wanted.div_ceil(PATHS).clamp(1, MOST_SETS) };
+        let wanted = if all.is_empty() { 0 } else { wanted.div_ceil(PATHS_PER_TASK).clamp(1, MOST_SETS) };
         let available = memory.available().saturating_sub(others);
         let sets = wanted.min(available / Self::footprint(1, has_splats).bytes()).max(wanted.min(1));
-        let lights = slice("virtual lights", sets * ROOM, memory)?;
+        let lights = slice("virtual lights", sets * VERTICES_PER_TASK, memory)?;
         let outputs = slice("virtual lights", sets, memory)?;
-        let splats = slice("splats", if has_splats { sets * PATHS } else { 0 }, memory)?;
+        let splats = slice("splats", if has_splats { sets * PATHS_PER_TASK } else { 0 }, memory)?;
         // Hidden caustics at the second vertex light the first by virtual lights alone.
         let reuse = if is_clamped || has_splats { Some(false) } else { reuse };
         let paths = PathTracing::new(context, reuse, executor)?;
@@ -169,8 +169,8 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
             bound: 0.0,
             traced: None,
             used: VirtualLightUse {
-                given: (sets * PATHS) as u32,
-                wanted: (wanted * PATHS) as u32,
+                given: (sets * PATHS_PER_TASK) as u32,
+                wanted: (wanted * PATHS_PER_TASK) as u32,
                 connections,
                 ..VirtualLightUse::default()
             },
@@ -194,8 +194,8 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
     ) -> Result<Option<Counters>, OutOfMemory> {
         let Self { context, emission, lights, outputs, splats, picture, .. } = self;
         let walk = LightPass::<F>::new(context.scene_context(), emission, context.settings, outputs.len());
-        let rooms = splats.chunks_mut(PATHS).map(Some).chain(core::iter::repeat_with(|| None));
-        let sets = lights.chunks_mut(ROOM).zip(outputs.iter_mut()).zip(rooms);
+        let rooms = splats.chunks_mut(PATHS_PER_TASK).map(Some).chain(core::iter::repeat_with(|| None));
+        let sets = lights.chunks_mut(VERTICES_PER_TASK).zip(outputs.iter_mut()).zip(rooms);
         let Passed { counters, is_complete } =
             executor.pass(sets, |set, ((lights, output), splats), worker| {
                 walk.run((set, pass), &mut worker.scratch, lights, splats.unwrap_or_default(), output)
@@ -204,14 +204,14 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
             return Ok(None);
         }
         let (splats, outputs) = (&**splats, &**outputs);
-        let lists = splats.chunks(PATHS).zip(outputs.iter().map(SetOutput::offsets));
+        let lists = splats.chunks(PATHS_PER_TASK).zip(outputs.iter().map(SetOutput::offsets));
         Ok(add_splats(executor, picture, lists)?.then_some(counters))
     }
 
     /// The virtual lights of tile `tile`.
     fn set(&self, tile: usize) -> &[VirtualLight] {
         let Some(set) = tile.checked_rem(self.outputs.len()) else { return &[] };
-        &self.lights[set * ROOM..][..self.outputs[set].lights as usize]
+        &self.lights[set * VERTICES_PER_TASK..][..self.outputs[set].lights as usize]
     }
 
     fn lighting(&self, tile: usize, is_clamped: bool) -> VirtualLighting<'_> {
@@ -248,7 +248,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         let Some(counters) = traced else { return Ok(false) };
         round.state.counters += counters;
         self.traced = Some(sample);
-        self.used.light_paths += (self.outputs.len() * PATHS) as u64;
+        self.used.light_paths += (self.outputs.len() * PATHS_PER_TASK) as u64;
         self.used.lights += self.outputs.iter().map(|output| u64::from(output.lights)).sum::<u64>();
         if self.is_clamped() {
             self.estimate_cut(sample, round)?;

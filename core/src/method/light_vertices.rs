@@ -4,19 +4,19 @@ use super::PhotonMapStore;
 use super::executor::{Executor, Passed};
 use crate::bsdf::Features;
 use crate::memory::OutOfMemory;
-use crate::transport::bidirectional::light_pass::{ROOM, TaskOutput};
+use crate::transport::bidirectional::light_pass::{TaskOutput, VERTICES_PER_TASK};
 use crate::transport::bidirectional::vertex::LightVertex;
 use crate::transport::{Counters, SceneContext};
 
 /// Photons that a task brings to the map.
 const PIECE: usize = 4096;
 
-/// Moves the vertices of all tasks, each with room for [`ROOM`], to the front, in task order. Returns their
-/// number.
+/// Moves the vertices of all tasks, each with room for [`VERTICES_PER_TASK`], to the front, in task order.
+/// Returns their number.
 pub(super) fn compact(vertices: &mut [LightVertex], outputs: &[TaskOutput]) -> usize {
     let mut stored = 0;
     for (task, output) in outputs.iter().enumerate() {
-        let first = task * ROOM;
+        let first = task * VERTICES_PER_TASK;
         let count = output.vertices as usize;
         if count > 0 {
             vertices.copy_within(first..first + count, stored);

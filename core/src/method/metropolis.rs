@@ -16,9 +16,9 @@ use crate::findings::Findings;
 use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::Counters;
+use crate::transport::metropolis::bootstrap::{Bootstrap, CANDIDATES, Lengths};
 use crate::transport::metropolis::chain::{Chains, ChainsOutput, Steps, room};
 use crate::transport::metropolis::lanes::LANES;
-use crate::transport::metropolis::look::{CANDIDATES, Lengths, Look};
 use crate::transport::metropolis::paths::Paths;
 use crate::transport::metropolis::split::{CELL, MAX_SEGMENTS, Split};
 use crate::transport::metropolis::target::Target;
@@ -66,7 +66,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
     /// Working memory of a worker.
     pub fn scratch() -> Footprint {
         let pilot = Footprint::default().slice::<Pixel>(PIXELS_PER_TILE).and(Paths::<F>::scratch());
-        Chains::<F>::scratch(LONGEST).or(Look::<F>::scratch()).or(pilot)
+        Chains::<F>::scratch(LONGEST).or(Bootstrap::<F>::scratch()).or(pilot)
     }
 
     /// Metropolis light transport of `context`, with fewer chains where memory is short, leaving `others`
@@ -133,12 +133,16 @@ impl<'a, F: Features> Metropolis<'a, F> {
     }
 
     /// Evaluates the independent points of a sample. The work; `None` where the executor is over.
-    fn look(&mut self, sample: u32, executor: &mut impl Executor) -> Result<Option<Counters>, OutOfMemory> {
+    fn bootstrap(
+        &mut self,
+        sample: u32,
+        executor: &mut impl Executor,
+    ) -> Result<Option<Counters>, OutOfMemory> {
         let densities = core::mem::take(&mut self.densities);
-        let look = Look::new(self.target(), self.lengths, self.context.settings.seed, sample);
+        let bootstrap = Bootstrap::new(self.target(), self.lengths, self.context.settings.seed, sample);
         let points = densities[..self.plan.candidates].chunks_mut(CANDIDATES);
-        let passed =
-            executor.pass(points, |task, densities, worker| look.run(task, &mut worker.scratch, densities));
+        let passed = executor
+            .pass(points, |task, densities, worker| bootstrap.run(task, &mut worker.scratch, densities));
         self.densities = densities;
         let Passed { counters, is_complete } = passed?;
         Ok(is_complete.then_some(counters))
@@ -154,15 +158,15 @@ impl<'a, F: Features> Metropolis<'a, F> {
             self.picture.fill([0.0; 3]);
             return Ok(Some(Counters::default()));
         }
-        let Some(mut counters) = self.look(sample, executor)? else { return Ok(None) };
+        let Some(mut counters) = self.bootstrap(sample, executor)? else { return Ok(None) };
         let Self { context, emission, split, space, lengths, plan, .. } = *self;
         let Self { densities, starts, splats, outputs, picture, .. } = self;
         let (densities, starts) = (&densities[..plan.candidates], &mut starts[..plan.chains]);
         let outputs = &mut outputs[..plan.tasks()];
         let (pixels, seed) = (picture.len(), context.settings.seed);
         let target = Target::<F>::new(context.scene_context(), &emission, context.settings, split, space);
-        let look = Look::new(target, lengths, seed, sample);
-        let brightness = look.choose(densities, starts);
+        let bootstrap = Bootstrap::new(target, lengths, seed, sample);
+        let brightness = bootstrap.choose(densities, starts);
         self.totals.add(brightness);
         if brightness == 0.0 {
             picture.fill([0.0; 3]);
@@ -170,7 +174,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
         }
         let visits = plan.chains as f64 * plan.mutations as f64;
         let scale = (brightness * context.pixels() as f64 / visits) as f32;
-        let chains = Chains::new(look, (seed, sample), pixels, plan.mutations as u32, scale);
+        let chains = Chains::new(bootstrap, (seed, sample), pixels, plan.mutations as u32, scale);
         let room = room(plan.mutations);
         let tasks = starts.chunks(LANES).zip(splats.chunks_mut(room)).zip(outputs.iter_mut());
         let passed = executor.pass(tasks, |task, ((starts, splats), output), worker| {

@@ -20,7 +20,7 @@ use crate::findings::{Finding, Findings};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::photon::{Kernel, PhotonMap};
 use crate::transport::photon_mapping::deposit::{
-    PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
+    PATHS_PER_TASK, PhotonFilter, PhotonTracer, PhotonTracerSettings, VERTICES_PER_TASK,
 };
 use crate::transport::photon_mapping::final_gather::{
     GlobalMapLookup, IRRADIANCES, PhotonMaps, PrecomputedIrradiance, STRIDE, may_have_caustics,
@@ -84,8 +84,8 @@ struct Built<'m> {
 
 /// Capacities of the maps of one half, for tasks of global and caustic light paths.
 fn capacities(global: usize, caustic: usize) -> [usize; 3] {
-    let global = global.saturating_mul(ROOM);
-    [global, global / STRIDE, caustic.saturating_mul(PATHS)]
+    let global = global.saturating_mul(VERTICES_PER_TASK);
+    [global, global / STRIDE, caustic.saturating_mul(PATHS_PER_TASK)]
 }
 
 impl<'m> Maps<'m> {
@@ -146,8 +146,10 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
         let seen = Target::Visible(FIRST_RADIUS as f32);
         let of_caustics = has_caustics.then(|| learn(PhotonFilter::Caustic, max_depth, seen)).transpose()?;
 
-        let usual = (context.pixels() / PIXELS_PER_PATH).div_ceil(PATHS).clamp(FEWEST, MOST);
-        let tasks = |asked: Option<u32>| asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS).max(1));
+        let usual = (context.pixels() / PIXELS_PER_PATH).div_ceil(PATHS_PER_TASK).clamp(FEWEST, MOST);
+        let tasks = |asked: Option<u32>| {
+            asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS_PER_TASK).max(1))
+        };
         let wanted = [tasks(settings.global), if has_caustics { tasks(settings.caustic) } else { 0 }];
         // Where memory is short, both get the same fraction of what they want.
         let available = memory.available().saturating_sub(reserve) / 2;
@@ -160,7 +162,7 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
             ..PhotonUse::default()
         };
         let photons = |guide, keep, seed, tasks: usize, max_depth| {
-            let paths = u32::try_from(tasks.saturating_mul(PATHS)).unwrap_or(u32::MAX);
+            let paths = u32::try_from(tasks.saturating_mul(PATHS_PER_TASK)).unwrap_or(u32::MAX);
             Photons { guide, settings: PhotonTracerSettings { keep, seed, paths, max_depth } }
         };
         let caustic_photons =
@@ -208,7 +210,7 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
         }
         let Some(map) = maps.global.map()? else { return Ok(false) };
         let all = PrecomputedIrradiance::new(bvh, &map, *farthest, *kernel, level);
-        let [_, count, _] = capacities(global.settings.paths as usize / PATHS, 0);
+        let [_, count, _] = capacities(global.settings.paths as usize / PATHS_PER_TASK, 0);
         let size = (count, IRRADIANCES);
         let irradiances = &mut maps.irradiances;
         let passed = round.executor.timed("photons", |executor| {

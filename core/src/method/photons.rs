@@ -3,7 +3,7 @@
 use crate::findings::Decision::{Limited, Used};
 use crate::findings::{Finding, Findings, Value};
 use crate::photon::Kernel;
-use crate::transport::photon_mapping::deposit::PATHS;
+use crate::transport::photon_mapping::deposit::PATHS_PER_TASK;
 
 /// Photon maps of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,7 +37,8 @@ pub struct MapUse {
 impl MapUse {
     /// Maps of `given` tasks of light paths each, of `wanted` ones.
     pub fn of_tasks(wanted: usize, given: usize) -> Self {
-        let [wanted, given] = [wanted, given].map(|tasks| (tasks as u64).saturating_mul(PATHS as u64));
+        let [wanted, given] =
+            [wanted, given].map(|tasks| (tasks as u64).saturating_mul(PATHS_PER_TASK as u64));
         Self { wanted, given, ..Self::default() }
     }
 

@@ -4,14 +4,14 @@ use super::executor::Executor;
 use crate::bsdf::Features;
 use crate::memory::{Arena, OutOfMemory};
 use crate::transport::{
-    Counters, Estimator, PathIntegrator, Pilot, path::WAVE, path::reuse_pilot::PILOT_TILES,
+    Counters, LightEstimator, PathIntegrator, Pilot, path::WAVE, path::reuse_pilot::PILOT_TILES,
 };
 
 /// The mean radiance of the picture.
 ///
 /// # Errors
 /// [`OutOfMemory`] where scratch has less than [`PathIntegrator::scratch_with`] bytes.
-pub fn mean_radiance<F: Features, E: Estimator<F>>(
+pub fn mean_radiance<F: Features, E: LightEstimator<F>>(
     integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
 ) -> Result<f32, OutOfMemory> {
@@ -22,14 +22,14 @@ pub fn mean_radiance<F: Features, E: Estimator<F>>(
 ///
 /// # Errors
 /// Those of [`mean_radiance`].
-pub fn mean_radiance_without_photons<F: Features, E: Estimator<F>>(
+pub fn mean_radiance_without_photons<F: Features, E: LightEstimator<F>>(
     integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
 ) -> Result<f32, OutOfMemory> {
     mean(integrator, executor, |tile, arena| integrator.pilot_rest(tile, WAVE, arena))
 }
 
-fn mean<F: Features, E: Estimator<F>>(
+fn mean<F: Features, E: LightEstimator<F>>(
     integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
     of_tile: impl Fn(usize, &mut Arena) -> Result<f32, OutOfMemory> + Sync,
@@ -44,7 +44,7 @@ fn mean<F: Features, E: Estimator<F>>(
 ///
 /// # Errors
 /// Those of [`mean_radiance`].
-pub fn variance<F: Features, E: Estimator<F>>(
+pub fn variance<F: Features, E: LightEstimator<F>>(
     integrator: &PathIntegrator<F, E>,
     mean: f32,
     executor: &mut impl Executor,
@@ -59,7 +59,7 @@ pub fn variance<F: Features, E: Estimator<F>>(
 }
 
 /// Fills `out` with the values of the pilot's tiles; those that the executor did not come to stay `None`.
-fn for_each_tile<F: Features, E: Estimator<F>, T: Send>(
+fn for_each_tile<F: Features, E: LightEstimator<F>, T: Send>(
     integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
     out: &mut [Option<T>; PILOT_TILES],

@@ -19,7 +19,7 @@ use crate::findings::Findings;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::photon::{Kernel, PhotonMap};
 use crate::transport::photon_mapping::deposit::{
-    PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
+    PATHS_PER_TASK, PhotonFilter, PhotonTracer, PhotonTracerSettings, VERTICES_PER_TASK,
 };
 use crate::transport::{PathIntegrator, PhotonLight, RadiusSchedule, path::WAVE};
 
@@ -30,8 +30,8 @@ pub const FIRST_RADIUS: f64 = 3.0;
 const ENOUGH: f64 = 12.0;
 
 /// Light paths for a sample: one for each pixel of the picture, within these limits.
-const FEWEST_PATHS: usize = 16 * PATHS;
-const MOST_PATHS: usize = 1024 * PATHS;
+const FEWEST_PATHS: usize = 16 * PATHS_PER_TASK;
+const MOST_PATHS: usize = 1024 * PATHS_PER_TASK;
 
 /// Progressive photon mapping of one picture.
 pub struct ProgressivePhotonMapping<'a, F> {
@@ -67,24 +67,24 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
         memory: &mut impl MemorySource<'a>,
         executor: &mut impl Executor,
     ) -> Result<Self, OutOfMemory> {
-        let of_task = PhotonMapStore::footprint(ROOM).bytes();
+        let of_task = PhotonMapStore::footprint(VERTICES_PER_TASK).bytes();
         let guide = GuideSettings {
             filter: PhotonFilter::Reflected,
             max_depth: context.settings.max_depth,
             target: Target::Visible(FIRST_RADIUS as f32),
-            reserve: reserve.saturating_add(FEWEST_PATHS / PATHS * of_task),
+            reserve: reserve.saturating_add(FEWEST_PATHS / PATHS_PER_TASK * of_task),
         };
         let guide = EmissionGuide::learn::<F>(context, guide, memory, executor)?;
         let usual = context.pixels().clamp(FEWEST_PATHS, MOST_PATHS);
-        let wanted = settings.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS).max(1);
+        let wanted = settings.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS_PER_TASK).max(1);
         let tasks = wanted.min(memory.available().saturating_sub(reserve) / of_task).max(1);
         Ok(Self {
             context: *context,
             integrator: context.integrator(),
             radii: context.radii(),
             kernel: settings.kernel,
-            paths: tasks.saturating_mul(PATHS),
-            photons: PhotonMapStore::new(tasks.saturating_mul(ROOM), memory)?,
+            paths: tasks.saturating_mul(PATHS_PER_TASK),
+            photons: PhotonMapStore::new(tasks.saturating_mul(VERTICES_PER_TASK), memory)?,
             sample: None,
             used: PhotonUse { global: Some(guide.map_use(wanted, tasks)), ..PhotonUse::default() },
             guide,

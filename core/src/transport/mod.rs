@@ -3,10 +3,10 @@
 //! `walk` traces subpaths from surface to surface. `wavefront` advances many camera paths together. [`path`]
 //! is the path tracer that renders; [`path::reference`] is the textbook form of the same estimator, one path
 //! at a time, against which the path tracer is tested. The other folders hold methods that supply part of the
-//! light from a data structure, each an [`Estimator`] of the path tracer: [`photon_mapping`] traces photons
-//! and estimates their density; [`caustics`] merges photons with paths; [`cached`] places, gathers and looks
-//! up records of the irradiance cache. [`metropolis`] runs Markov chains over the random numbers of paths.
-//! `prepass` learns structures before the first sample.
+//! light from a data structure, each a [`LightEstimator`] of the path tracer: [`photon_mapping`] traces
+//! photons and estimates their density; [`caustics`] merges photons with paths; [`cached`] places, gathers
+//! and looks up records of the irradiance cache. [`metropolis`] runs Markov chains over the random numbers of
+//! paths. `prepass` learns structures before the first sample.
 
 pub mod bidirectional;
 pub mod cached;
@@ -23,7 +23,7 @@ mod wavefront;
 pub use cached::lookup::CacheView;
 pub use caustics::merge::CausticMerging;
 pub use path::reuse_pilot::Pilot;
-pub use path::{Estimator, PathIntegrator, PathReuse, Sharing};
+pub use path::{LightEstimator, PathIntegrator, PathReuse, Sharing};
 pub use photon_mapping::density::PhotonLight;
 pub use photon_mapping::radius::RadiusSchedule;
 pub use prepass::environment_visibility::{VisibilityGain, VisibilityPrepass, VisibilityVertex};

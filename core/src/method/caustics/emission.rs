@@ -6,7 +6,7 @@ use crate::light::EmissionSampler;
 use crate::memory::Footprint;
 use crate::method::{PhotonMapStore, RenderContext};
 use crate::transport::RadiusSchedule;
-use crate::transport::caustics::tracer::{CausticPhotonTracer, ROOM};
+use crate::transport::caustics::tracer::{CausticPhotonTracer, PHOTONS_PER_TASK};
 use crate::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
 
 /// Radius of the discs of the first sample, in pixels, with the usual photon budget.
@@ -34,7 +34,7 @@ pub struct CausticEmission<'a> {
 
 /// Memory for the fewest photons.
 pub fn least_footprint() -> Footprint {
-    let map = PhotonMapStore::footprint(ROOM);
+    let map = PhotonMapStore::footprint(PHOTONS_PER_TASK);
     map.and(map)
 }
 

@@ -11,14 +11,14 @@ use crate::method::executor::{Executor, Passed};
 use crate::method::path::PathTracing;
 use crate::method::{MapUse, PhotonMapPair, PhotonMapStore, PhotonUse, RenderContext, Round, pilot};
 use crate::photon::PhotonMap;
-use crate::transport::caustics::tracer::{PATHS, ROOM};
-use crate::transport::{CausticMerging, Estimator, PathIntegrator, RadiusSchedule, Sharing, path::WAVE};
+use crate::transport::caustics::tracer::{PATHS_PER_TASK, PHOTONS_PER_TASK};
+use crate::transport::{CausticMerging, LightEstimator, PathIntegrator, RadiusSchedule, Sharing, path::WAVE};
 
 /// Light paths of a map for each pixel of the picture and each sample that the map serves, with the usual
 /// photon budget; at least and at most.
 const PATHS_PER_SAMPLE: f64 = 0.5;
-const FEWEST_PATHS: usize = 16 * PATHS;
-const MOST_PATHS: usize = 4096 * PATHS;
+const FEWEST_PATHS: usize = 16 * PATHS_PER_TASK;
+const MOST_PATHS: usize = 4096 * PATHS_PER_TASK;
 
 /// Samples that share a pair of maps, at most: fewer would not fill the wavefront of a tile.
 const MOST_SAMPLES: u32 = 8;
@@ -109,20 +109,21 @@ impl<'a> CausticPhotons<'a> {
         let CausticSettings { beside_records, reserved, .. } = settings;
         let paths = emission.benefit.photon_budget() * PATHS_PER_SAMPLE * context.pixels() as f64;
         let paths_per_sample = (paths as usize).clamp(FEWEST_PATHS, MOST_PATHS);
-        let wanted = (paths_per_sample * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS);
+        let wanted =
+            (paths_per_sample * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS_PER_TASK);
         if !memory.has(least_footprint()) {
             return Ok(None);
         }
         let shares = if beside_records { 4 } else { 2 };
         let available = memory.available().saturating_sub(reserved) / shares;
-        let tasks = wanted.min(available / PhotonMapStore::footprint(ROOM).bytes()).max(1);
+        let tasks = wanted.min(available / PhotonMapStore::footprint(PHOTONS_PER_TASK).bytes()).max(1);
         Ok(Some(Self {
             context: *context,
             emission,
             beside_records,
-            stores: PhotonMapPair::new(tasks * ROOM, memory)?,
+            stores: PhotonMapPair::new(tasks * PHOTONS_PER_TASK, memory)?,
             paths_per_sample,
-            most_paths: tasks * PATHS,
+            most_paths: tasks * PATHS_PER_TASK,
             statistics: PhotonUse { caustic: Some(MapUse::of_tasks(wanted, tasks)), ..PhotonUse::default() },
             made: None,
         }))
@@ -163,7 +164,7 @@ impl<'a> CausticPhotons<'a> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).
-    pub fn round<F: Features, E: Estimator<F, State = ()>, R: Sharing>(
+    pub fn round<F: Features, E: LightEstimator<F, State = ()>, R: Sharing>(
         &mut self,
         integrator: &PathIntegrator<F, E, R>,
         round: &mut Round<impl Executor>,
@@ -259,7 +260,7 @@ impl<'a> CausticPhotons<'a> {
         let Self { context, emission, beside_records, stores, statistics, .. } = self;
         let tracer = photon_tracer::<F>(context, &emission.sampler, paths, radii, *beside_records);
         let store = if number.is_multiple_of(2) { &mut stores.even } else { &mut stores.odd };
-        let size = (tracer.tasks() * ROOM, ROOM);
+        let size = (tracer.tasks() * PHOTONS_PER_TASK, PHOTONS_PER_TASK);
         let passed = executor.timed("photons", |executor| {
             store.fill(executor, size, |task, scratch, photons| tracer.run(task, number, scratch, photons))
         })?;

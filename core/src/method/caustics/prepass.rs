@@ -9,13 +9,13 @@ use crate::memory::{Arena, Footprint, Line, MemorySource, OutOfMemory};
 use crate::method::path::PathTracing;
 use crate::method::{Executor, RenderContext, pilot};
 use crate::photon::Photons;
-use crate::transport::caustics::tracer::{GuideSample, PATHS};
+use crate::transport::caustics::tracer::{GuideSample, PATHS_PER_TASK};
 use crate::transport::{CausticMerging, RadiusSchedule};
 
 /// Light paths of the first test, which ends the prepass where there is next to nothing to find, and of each
 /// later step; where memory is short, fewer, but no fewer than those of the test.
-const FIRST_TEST: usize = 4 * PATHS;
-const STEP: usize = 32 * PATHS;
+const FIRST_TEST: usize = 4 * PATHS_PER_TASK;
+const STEP: usize = 32 * PATHS_PER_TASK;
 
 /// Numbers of the photon maps whose light paths are used.
 const AIMED_MAP: u32 = 0;
@@ -70,8 +70,8 @@ fn lent(lights: &LightSampler, step: usize) -> Footprint {
 /// Light paths of a step that there is memory for within `available` bytes.
 fn step(lights: &LightSampler, available: usize) -> usize {
     let left = available.saturating_sub(kept(lights).and(lent(lights, 0)).bytes());
-    let task = Footprint::default().slice::<GuideSample>(PATHS);
-    (left / task.bytes() * PATHS).clamp(FIRST_TEST, STEP)
+    let task = Footprint::default().slice::<GuideSample>(PATHS_PER_TASK);
+    (left / task.bytes() * PATHS_PER_TASK).clamp(FIRST_TEST, STEP)
 }
 
 /// Runs a prepass for a picture of `context`; `paths` measure it without photons.
@@ -218,7 +218,7 @@ impl<E: Executor> LightPaths<'_, E> {
         let Self { context, radii, beside_records, found, executor } = self;
         let tracer = photon_tracer::<F>(context, sampler, count, *radii, *beside_records);
         found.fill(GuideSample::default());
-        let pieces = found.get_mut(..count).unwrap_or_default().chunks_mut(PATHS);
+        let pieces = found.get_mut(..count).unwrap_or_default().chunks_mut(PATHS_PER_TASK);
         let _ = executor
             .pass(pieces, |task, found, worker| tracer.look(task, map, &mut worker.scratch, found))?;
         Ok(())

@@ -19,7 +19,7 @@ use crate::method::{PhotonMapStore, RenderContext, light_vertices};
 use crate::photon::PhotonMap;
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::contribution::Contribution;
-use crate::transport::bidirectional::light_pass::{LightPass, PATHS, ROOM, TaskOutput};
+use crate::transport::bidirectional::light_pass::{LightPass, PATHS_PER_TASK, TaskOutput, VERTICES_PER_TASK};
 use crate::transport::bidirectional::merge_photons::{MergeRadii, Merging};
 use crate::transport::bidirectional::mis::Counts;
 use crate::transport::bidirectional::vertex::LightVertex;
@@ -113,11 +113,12 @@ fn footprint(tasks: usize, tiles: usize, merging: bool) -> Footprint {
     let mut footprint = Footprint::default().slice::<Block>(tiles * BLOCKS).slice::<f32>(tiles * SUMS);
     for _ in 0..WEIGHTINGS {
         footprint = footprint
-            .slice::<LightVertex>(tasks * ROOM)
-            .slice::<Splat>(tasks * ROOM)
+            .slice::<LightVertex>(tasks * VERTICES_PER_TASK)
+            .slice::<Splat>(tasks * VERTICES_PER_TASK)
             .slice::<TaskOutput>(tasks);
     }
-    let photons = if merging { PhotonMapStore::footprint(tasks * ROOM) } else { Footprint::default() };
+    let photons =
+        if merging { PhotonMapStore::footprint(tasks * VERTICES_PER_TASK) } else { Footprint::default() };
     footprint.and(photons)
 }
 
@@ -137,12 +138,12 @@ pub fn run<'a, F: Features>(
     let context = RenderContext { settings: small(context.settings), ..*context };
     let PathSettings { width, height, .. } = context.settings;
     let pixels_per_path = if merging { 1 } else { PIXELS_PER_LIGHT_PATH };
-    let tasks = (context.pixels() / pixels_per_path).div_ceil(PATHS).max(1);
+    let tasks = (context.pixels() / pixels_per_path).div_ceil(PATHS_PER_TASK).max(1);
     let footprint = footprint(tasks, Tile::count(width, height), merging);
     if !memory.has(footprint) {
         return Ok(None);
     }
-    let light_paths = (tasks * PATHS) as f32 / context.pixels() as f32;
+    let light_paths = (tasks * PATHS_PER_TASK) as f32 / context.pixels() as f32;
     let counts = Candidate { light_paths, connections: CONNECTIONS, merging: true };
     let pilot =
         Pilot::<F> { context, emission, tasks, counts, candidates, features: core::marker::PhantomData };
@@ -167,7 +168,7 @@ impl<F: Features> Pilot<'_, '_, F> {
         executor: &mut impl Executor,
     ) -> Result<Option<Found>, OutOfMemory> {
         let PathSettings { width, height, .. } = self.context.settings;
-        let light_paths = (self.tasks * PATHS) as f32;
+        let light_paths = (self.tasks * PATHS_PER_TASK) as f32;
         let tiles = Tile::count(width, height);
         let blocks = arena.slice::<Block>(tiles * BLOCKS)?;
         let sums = arena.slice::<f32>(tiles * SUMS)?;
@@ -180,8 +181,8 @@ impl<F: Features> Pilot<'_, '_, F> {
             Ok(Weighting {
                 counts,
                 radii: merging.then_some(radii),
-                vertices: arena.slice(self.tasks * ROOM)?,
-                splats: arena.slice(self.tasks * ROOM)?,
+                vertices: arena.slice(self.tasks * VERTICES_PER_TASK)?,
+                splats: arena.slice(self.tasks * VERTICES_PER_TASK)?,
                 outputs: arena.slice(self.tasks)?,
                 stored: 0,
             })
@@ -234,10 +235,13 @@ impl<F: Features> Pilot<'_, '_, F> {
     ) -> Result<Option<Counters>, OutOfMemory> {
         let Weighting { counts, radii, vertices, splats, outputs, stored } = weighting;
         let scene = self.context.scene_context::<F>();
-        let light_paths = Counts { light_paths: (self.tasks * PATHS) as f32, ..*counts };
+        let light_paths = Counts { light_paths: (self.tasks * PATHS_PER_TASK) as f32, ..*counts };
         let pass = LightPass::new(scene, self.emission, self.context.settings, light_paths, *radii)
             .weighted_by(*counts, *radii);
-        let tasks = vertices.chunks_mut(ROOM).zip(splats.chunks_mut(ROOM)).zip(outputs.iter_mut());
+        let tasks = vertices
+            .chunks_mut(VERTICES_PER_TASK)
+            .zip(splats.chunks_mut(VERTICES_PER_TASK))
+            .zip(outputs.iter_mut());
         let Passed { counters, is_complete } =
             executor.pass(tasks, |task, ((vertices, splats), output), worker| {
                 pass.run((task, sample), &mut worker.scratch, vertices, splats, output)
@@ -271,8 +275,8 @@ impl<F: Features> Pilot<'_, '_, F> {
         let weighed = weigh(lists, fewest, weighed);
         self.add_camera_paths(weighed, (sample, sums), blocks);
         for (task, output) in weightings[0].outputs.iter().enumerate() {
-            for i in 0..output.offsets().count().min(ROOM) {
-                self.add_splat(tile, weightings, task * ROOM + i, blocks);
+            for i in 0..output.offsets().count().min(VERTICES_PER_TASK) {
+                self.add_splat(tile, weightings, task * VERTICES_PER_TASK + i, blocks);
             }
         }
         if sample + 1 == SAMPLES {
@@ -296,7 +300,8 @@ impl<F: Features> Pilot<'_, '_, F> {
     ) -> CameraPaths<'w, F> {
         let vertices = &weighting.vertices[..weighting.stored];
         let connections = Connections { vertices, count: CONNECTIONS };
-        let merging = map.zip(weighting.radii).map(|(photons, radii)| Merging { photons, vertices, radii });
+        let merging =
+            map.zip(weighting.radii).map(|(photons, radii)| Merging { photons: *photons, vertices, radii });
         let scene = self.context.scene_context::<F>();
         CameraPaths::new(scene, self.emission, self.context.settings, weighting.counts, connections)
             .with_merging(merging)

@@ -7,7 +7,7 @@ use crate::film::{PIXELS_PER_TILE, Pixel};
 use crate::light::luminance;
 use crate::memory::OutOfMemory;
 use crate::method::executor::Executor;
-use crate::transport::metropolis::look::{Lengths, Look};
+use crate::transport::metropolis::bootstrap::{Bootstrap, Lengths};
 use crate::transport::metropolis::split::{CELL, MAX_SEGMENTS, Split};
 use core::ops::Range;
 
@@ -103,7 +103,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
     fn affordable(&mut self, whole: Plan, executor: &mut impl Executor) -> Result<Plan, OutOfMemory> {
         self.plan = whole;
         self.densities.fill(f32::NAN);
-        if self.look(PILOT - 1, executor)?.is_some() {
+        if self.bootstrap(PILOT - 1, executor)?.is_some() {
             return Ok(whole);
         }
         let evaluated = self.densities.iter().filter(|density| !density.is_nan()).count();
@@ -158,12 +158,12 @@ impl<'a, F: Features> Metropolis<'a, F> {
     ) -> Result<bool, OutOfMemory> {
         let mut sums = [0.0; MAX_SEGMENTS as usize + 1];
         for sample in samples {
-            if self.look(sample, executor)?.is_none() {
+            if self.bootstrap(sample, executor)?.is_none() {
                 return Ok(false);
             }
-            let look = Look::new(self.target(), self.lengths, self.context.settings.seed, sample);
+            let bootstrap = Bootstrap::new(self.target(), self.lengths, self.context.settings.seed, sample);
             for (&density, candidate) in self.densities[..self.plan.candidates].iter().zip(0..) {
-                if let Some(sum) = sums.get_mut(look.length(candidate).0 as usize) {
+                if let Some(sum) = sums.get_mut(bootstrap.length(candidate).0 as usize) {
                     *sum += f64::from(density);
                 }
             }

@@ -27,14 +27,12 @@ pub(super) struct CameraPath {
     pub(super) position: [f32; 3],
     pub(super) normal: [f32; 3],
     /// Sums after the last scattering.
-    pub(super) last: f32,
-    pub(super) rest: f32,
-    pub(super) merge: f32,
+    pub(super) sums: Sums,
     pub(super) segments: u32,
     /// 1 behind the first rough vertex.
     pub(super) has_rough: u32,
     /// η: count of merges at the last vertex.
-    pub(super) merge_count: f32,
+    pub(super) eta_vcm: f32,
     /// m: length from the lens to the last vertex.
     pub(super) travelled: f32,
     pub(super) crossings: u32,
@@ -64,13 +62,9 @@ impl CameraPath {
         self.has_rough == 1
     }
 
-    pub(super) fn sums(&self) -> Sums {
-        Sums { last: self.last, rest: self.rest, merge: self.merge }
-    }
-
     /// Sums for a light at the end of the segment. No light path splats direct light.
     pub(super) fn sums_of_hit(&self) -> Sums {
-        if self.segments == 2 { Sums::default() } else { self.sums() }
+        if self.segments == 2 { Sums::default() } else { self.sums }
     }
 }
 
@@ -85,7 +79,7 @@ pub(super) struct Vertex<'v> {
     /// No rough vertex lies before it.
     pub(super) is_first_rough: bool,
     /// η: count of merges here, 0 where there is none.
-    pub(super) merge: f32,
+    pub(super) eta_vcm: f32,
     /// The shading normal depends on the camera path: no light path can come here.
     pub(super) is_bent: bool,
     pub(super) sampler: Sampler,

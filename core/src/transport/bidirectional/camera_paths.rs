@@ -83,6 +83,12 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         Self { merging, ..self }
     }
 
+    /// Camera paths with the same weights whose merges bring no light; `None` without merging.
+    pub fn without_light_of_merges(self) -> Option<Self> {
+        let merging = self.merging.map(|merging| Merging { vertices: &[], ..merging });
+        merging.map(|merging| self.with_merging(Some(merging)))
+    }
+
     /// Working memory of a task with so many connections of a vertex.
     pub fn scratch(connections: u32) -> Footprint {
         let shadows = PIXELS_PER_TILE * (1 + connections as usize);
@@ -313,11 +319,12 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let is_bent = is_bent(&point, wo);
         let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, &bsdf, direction) };
         let is_first_rough = path.has_rough == 0 && !bsdf.is_caustic_caster();
-        let merge = match self.merging {
-            Some(merging) if is_first_rough && !is_bent => merging.radii.count(&bsdf, point.position),
+        let eta_vcm = match &self.merging {
+            Some(merging) if is_first_rough && !is_bent => merging.radii.eta_vcm(&bsdf, point.position),
             _ => 0.0,
         };
-        let vertex = Vertex { point: &point, bsdf: &bsdf, wo, sums, is_first_rough, merge, is_bent, sampler };
+        let vertex =
+            Vertex { point: &point, bsdf: &bsdf, wo, sums, is_first_rough, eta_vcm, is_bent, sampler };
         let before = path.radiance;
         self.merge(path, &vertex);
         queue.record(Class::Merges, path, before);
@@ -330,9 +337,9 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         self.scatter(path, &vertex, hit, direction, counters)
     }
 
-    /// The squared distance within which a rough vertex is near one with this count of merges.
-    pub(super) fn near(&self, count: f32) -> f32 {
-        self.merging.map_or(0.0, |merging| merging.radii.near(count))
+    /// The squared distance within which a rough vertex is near one whose merges count η.
+    pub(super) fn near(&self, eta_vcm: f32) -> f32 {
+        self.merging.as_ref().map_or(0.0, |merging| merging.radii.near(eta_vcm))
     }
 
     /// Sums where the path arrives at `point`.
@@ -341,8 +348,8 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let is_delta = bsdf.is_delta();
         if path.segments > 1 {
             let squared = point.position.distance_squared(path.position.into());
-            let sums = path.sums().arrive(squared, cos, is_delta);
-            let arrival = Arrival::of(bsdf.is_caustic_caster(), squared, self.near(path.merge_count));
+            let sums = path.sums.arrive(squared, cos, is_delta);
+            let arrival = Arrival::of(bsdf.is_caustic_caster(), squared, self.near(path.eta_vcm));
             // The segment is that behind the vertex of the merge.
             let is_merged = arrival.is_some_and(|arrival| arrival.is_merged(path.segments - 1));
             return if is_merged { sums.with_merge() } else { sums };

@@ -22,7 +22,7 @@ use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-pub use crate::transport::walk::light::{PATHS, ROOM};
+pub use crate::transport::walk::light::{PATHS_PER_TASK, VERTICES_PER_TASK};
 
 /// Dimensions of the sampler at a vertex of a light path.
 pub(super) const DIMENSIONS: u32 = 5;
@@ -81,7 +81,7 @@ impl<'a, F: Features> LightPass<'a, F> {
     /// Working memory of a task.
     pub fn scratch() -> Footprint {
         LightWalk::<F>::scratch()
-            .slice::<Splat>(ROOM)
+            .slice::<Splat>(VERTICES_PER_TASK)
             .slice::<Ray>(SHADOW_RAYS)
             .slice::<[f32; 3]>(SHADOW_RAYS)
             .slice::<Hit>(SHADOW_RAYS)
@@ -89,7 +89,7 @@ impl<'a, F: Features> LightPass<'a, F> {
     }
 
     /// Traces the paths of `task` for sample number `sample`: their vertices into `vertices`, splats sorted
-    /// by strips into `splats`, each with room for [`ROOM`].
+    /// by strips into `splats`, each with room for [`VERTICES_PER_TASK`].
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`LightPass::scratch`].
@@ -111,7 +111,7 @@ impl<'a, F: Features> LightPass<'a, F> {
             merging,
             vertices,
             stored: 0,
-            splats: arena.slice(ROOM)?,
+            splats: arena.slice(VERTICES_PER_TASK)?,
             splatted: 0,
             shadows: ShadowRays {
                 rays: arena.slice(SHADOW_RAYS)?,
@@ -135,7 +135,7 @@ impl<'a, F: Features> LightPass<'a, F> {
 
     /// Tasks of a pass.
     pub fn tasks(&self) -> usize {
-        (self.paths as usize).div_ceil(PATHS)
+        (self.paths as usize).div_ceil(PATHS_PER_TASK)
     }
 }
 
@@ -165,24 +165,23 @@ impl<F: Features> Writer<'_, F> {
             return sums_from_light(context, emission, counts, origin, end, vertex.to_light);
         }
         let squared = vertex.point.position.distance_squared(state.position.into());
-        sums(state).arrive(squared, cos, is_delta)
+        state.sums.arrive(squared, cos, is_delta)
     }
 
-    /// η at a rough vertex and the way by which light comes there, if it may be merged. `None` at a narrow
-    /// vertex.
+    /// η at a rough vertex and the way by which light comes there, if it may be merged. `None` at a caster.
     fn merge(&self, state: &LightPathState, vertex: &Vertex) -> Option<(f32, Option<Arrival>)> {
         if vertex.bsdf.is_caustic_caster() {
             return None;
         }
         let position = vertex.point.position;
         let Some(radii) = self.merging else { return Some((0.0, None)) };
-        let count = radii.count(vertex.bsdf, position);
-        if count == 0.0 || state.segments == 1 {
+        let eta_vcm = radii.eta_vcm(vertex.bsdf, position);
+        if eta_vcm == 0.0 || state.segments == 1 {
             return Some((0.0, None));
         }
         let squared = position.distance_squared(state.position.into());
-        let arrival = Arrival::of(state.mirrored == 1, squared, radii.near(count));
-        Some((if arrival.is_some() { count } else { 0.0 }, arrival))
+        let arrival = Arrival::of(state.from_caster == 1, squared, radii.near(eta_vcm));
+        Some((if arrival.is_some() { eta_vcm } else { 0.0 }, arrival))
     }
 
     fn store(&mut self, state: &LightPathState, vertex: &Vertex, counters: &mut Counters) {
@@ -201,9 +200,10 @@ impl<F: Features> Writer<'_, F> {
             segments: state.segments.min(u32::from(u16::MAX)) as u16,
             to_light: vertex.to_light.to_array(),
             barycentric: vertex.barycentric,
-            last: state.last,
-            rest: state.rest,
-            merge: merge.map_or(state.merge, |(count, _)| count),
+            sums: Sums {
+                pending_merge: merge.map_or(state.sums.pending_merge, |(eta_vcm, _)| eta_vcm),
+                ..state.sums
+            },
             ..LightVertex::default()
         }
         .with_arrival(merge.and_then(|(_, arrival)| arrival));
@@ -236,11 +236,11 @@ impl<F: Features> Writer<'_, F> {
         let pixels = width as f32 * height as f32;
         let pdf_area = pixels * seen.pdf * cos_out / seen.distance / seen.distance;
         let merge = match self.merge(state, vertex) {
-            None => state.merge * scattering.to_light,
-            Some((count, Some(arrival))) if arrival.is_merged(1) => count,
+            None => state.sums.pending_merge * scattering.pdf_to_light,
+            Some((eta_vcm, Some(arrival))) if arrival.is_merged(1) => eta_vcm,
             Some(_) => 0.0,
         };
-        let weight = weight_of_splat(&self.counts, &sums(state), pdf_area, scattering.to_light, merge);
+        let weight = weight_of_splat(&self.counts, &state.sums, pdf_area, scattering.pdf_to_light, merge);
         // Where the shading normal differs from the geometric one, power was counted by the latter (Veach
         // 1997, 5.3).
         let radiance = Rgb::from(state.power) * scattering.value * (pdf_area * weight / cos_in);
@@ -274,11 +274,7 @@ impl<F: Features> Writer<'_, F> {
 
 /// The way a light path goes on from `bsdf`: mirrors and dielectrics store nothing, and have no limit.
 pub(super) fn continuation(bsdf: &Bsdf) -> Continuation {
-    Continuation { most: if bsdf.is_delta() { 1.0 } else { MAX_CONTINUATION }, mirrored: false }
-}
-
-fn sums(state: &LightPathState) -> Sums {
-    Sums { last: state.last, rest: state.rest, merge: state.merge }
+    Continuation { most: if bsdf.is_delta() { 1.0 } else { MAX_CONTINUATION }, specular_only: false }
 }
 
 /// The point of the lens from which the camera sees `position` as `seen`.
@@ -312,8 +308,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
             return None;
         }
         let cos_in = vertex.to_light.dot(vertex.point.geometric_normal).abs();
-        let sums = self.arrive(state, vertex, cos_in);
-        (state.last, state.rest, state.merge) = (sums.last, sums.rest, sums.merge);
+        state.sums = self.arrive(state, vertex, cos_in);
         if !vertex.bsdf.is_delta() {
             self.store(state, vertex, counters);
             if self.pending == SHADOW_RAYS {
@@ -333,18 +328,16 @@ impl<F: Features> Visitor for Writer<'_, F> {
     ) {
         let (point, bsdf) = (vertex.point, vertex.bsdf);
         let cos_in = vertex.to_light.dot(point.geometric_normal).abs();
-        let sums = sums(state);
-        let sums = if sample.delta {
-            sums.scatter_delta(cos_in, sample.eta)
+        state.sums = if sample.delta {
+            state.sums.scatter_delta(cos_in, sample.eta)
         } else {
             let towards = point.frame.to_world(sample.direction);
             let cos_out = towards.dot(point.geometric_normal).abs();
             let reverse = reverse_pdf(&self.context, (point, bsdf), from, sample.direction);
-            let merge = self.merge(state, vertex).map(|(count, _)| count);
-            sums.scatter(&self.counts, sample.pdf, reverse, cos_out, merge)
+            let eta_vcm = self.merge(state, vertex).map(|(eta_vcm, _)| eta_vcm);
+            state.sums.scatter(&self.counts, sample.pdf, reverse, cos_out, eta_vcm)
         };
-        (state.last, state.rest, state.merge) = (sums.last, sums.rest, sums.merge);
-        state.mirrored = u32::from(sample.delta || bsdf.is_caustic_caster());
+        state.from_caster = u32::from(sample.delta || bsdf.is_caustic_caster());
         state.position = point.position.to_array();
     }
 }

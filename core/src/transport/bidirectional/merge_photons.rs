@@ -21,7 +21,7 @@ pub struct MergeRadii {
 impl MergeRadii {
     /// η: expected number of light paths in the disc at `position`, if each has one vertex per m² there; 0
     /// where nothing is merged.
-    pub(super) fn count(&self, bsdf: &Bsdf, position: Vec3) -> f32 {
+    pub(super) fn eta_vcm(&self, bsdf: &Bsdf, position: Vec3) -> f32 {
         if !bsdf.is_receiver() {
             return 0.0;
         }
@@ -30,8 +30,8 @@ impl MergeRadii {
     }
 
     /// The squared distance within which a rough vertex is near, where merges count η.
-    pub(super) fn near(&self, count: f32) -> f32 {
-        count / self.emphasis
+    pub(super) fn near(&self, eta_vcm: f32) -> f32 {
+        eta_vcm / self.emphasis
     }
 }
 
@@ -39,7 +39,7 @@ impl MergeRadii {
 #[derive(Clone, Copy)]
 pub struct Merging<'a> {
     /// Photons whose tags are indices of `vertices`.
-    pub photons: &'a PhotonMap<'a>,
+    pub photons: PhotonMap<'a>,
     /// All light vertices.
     pub vertices: &'a [LightVertex],
     /// Kernels.

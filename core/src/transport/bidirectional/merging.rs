@@ -1,6 +1,6 @@
 //! Vertex merging (Georgiev et al. 2012) at one vertex of a path: the first rough one from the camera, if
-//! light comes to it by mirrors, glass or narrow gloss; or, where the camera sees it by others of them, from
-//! a rough surface so near that its connections would be fireflies.
+//! light comes to it from a caster: a mirror, glass or narrow gloss; or, where the camera sees it by casters,
+//! from a rough surface so near that its connections would be fireflies.
 //!
 //! No connection finds such light, which light samples and paths by chance find badly, and splats find it on
 //! the area of a pixel alone. The rest of what density estimation could find has better techniques: light
@@ -22,9 +22,9 @@ use glam::Vec3;
 impl<F: Features> CameraPaths<'_, F> {
     /// Light of the photons around `vertex`.
     pub(super) fn merge(&self, path: &mut CameraPath, vertex: &Vertex) {
-        let Some(Merging { photons, radii, .. }) = self.merging else { return };
-        let Vertex { point, merge, ref sampler, .. } = *vertex;
-        if merge == 0.0 || photons.is_empty() {
+        let Some(Merging { photons, radii, .. }) = &self.merging else { return };
+        let Vertex { point, eta_vcm, ref sampler, .. } = *vertex;
+        if eta_vcm == 0.0 || photons.is_empty() {
             return;
         }
         let disc = QueryDisc {
@@ -59,7 +59,7 @@ impl<F: Features> CameraPaths<'_, F> {
         (disc, boundary): (&QueryDisc, Option<&KernelBoundary>),
     ) -> [Rgb; 2] {
         let mut sums = [Rgb::ZERO; 2];
-        let Some(Merging { photons, vertices, .. }) = self.merging else { return sums };
+        let Some(Merging { photons, vertices, .. }) = &self.merging else { return sums };
         photons.tagged_within(self.context.level, disc, boundary, |tag, weights| {
             let light =
                 vertices.get(tag as usize).map_or(Rgb::ZERO, |light| self.merged(path, vertex, light));
@@ -74,14 +74,14 @@ impl<F: Features> CameraPaths<'_, F> {
         if !is_merged || path.segments + u32::from(light.segments) > self.settings.max_depth {
             return Rgb::ZERO;
         }
-        let Vertex { point, bsdf, wo, ref sums, merge, .. } = *vertex;
+        let Vertex { point, bsdf, wo, ref sums, eta_vcm, .. } = *vertex;
         let to_light = Vec3::from(light.to_light);
         let wi = point.frame.to_local(to_light);
         if !point.sides_agree(wi, to_light) {
             return Rgb::ZERO;
         }
         let at = scattering(&self.context, (point, bsdf), wo, wi);
-        let weight = weight_of_merge(merge, (sums, at.to_camera), (&light.sums(), at.to_light));
+        let weight = weight_of_merge(eta_vcm, (sums, at.pdf_to_camera), (&light.sums, at.pdf_to_light));
         // The cosine of the geometric normal is in the density of photons.
         Rgb::from(light.power) * at.value * (weight / to_light.dot(point.geometric_normal).abs().max(GRAZING))
     }

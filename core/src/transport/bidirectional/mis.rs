@@ -3,23 +3,20 @@
 //!
 //! A path x₀ … x_k from a light to the lens can be found by every technique: the camera walk hits the light,
 //! a light sample, a connection of two vertices, a merge at one vertex, a splat of a light vertex. The
-//! balance heuristic divides the count times the density of a technique by the sum over all of them. Each
-//! subpath carries three numbers, with which the sum is known:
-//!
-//! - `last`: the technique that connects over the latest segment,
-//! - `rest`: all techniques before it, still to be multiplied with the reverse density at the latest vertex,
-//! - `merge`: the merge at the latest rough vertex, likewise, as long as it may turn out not to be one.
+//! balance heuristic divides the count times the density of a technique by the sum over all of them, which
+//! the three numbers of [`Sums`] of both subpaths give.
 //!
 //! A path is merged at one vertex at most (`merging.rs`): the first rough one from the camera, if the vertex
-//! before it on the way from the light is narrow or near. Neither subpath knows both sides, so that the merge
-//! has a number of its own: the next rough vertex of a light path takes its place, and a camera path adds it
-//! to `rest` if its next vertex is narrow or near. Georgiev's dVCM, dVC and dVM are `last`, `rest` and
-//! `rest` / η where every vertex is merged.
+//! before it on the way from the light is a caster or near. Neither subpath knows both sides, so the merge
+//! has a number of its own, `pending_merge`: the next rough vertex of a light path replaces it, and a camera
+//! path adds it to `rest` if its next vertex is a caster or near.
 //!
 //! p is the density per solid angle with which a walk goes on, p← that of the opposite walk, c a cosine to
 //! the geometric normal, d a distance, e the density of emission per étendue (`light/emission/pdf.rs`), q the
-//! density of the rays of one pixel, η = L π r² the expected number of light paths in the disc of a merge.
-//! Roulette stays out of the weights, which add up to one without it.
+//! density of the rays of one pixel, η = L π r² the expected number of light paths in the disc of a merge
+//! (`eta_vcm`). Roulette stays out of the weights, which add up to one without it.
+
+use bytemuck::{Pod, Zeroable};
 
 /// How often each technique is used for a sample of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,15 +30,30 @@ pub struct Counts {
     pub light_samples: f32,
 }
 
-/// The sums of one subpath.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// The running sums of one subpath.
+///
+/// | | `last` | `rest` | `pending_merge` |
+/// |---|---|---|---|
+/// | Georgiev's and SmallVCM's | dVCM | dVC = η dVM | the term η of one vertex in dVC |
+/// | techniques | connects over the latest segment | all before it | merge at the latest rough vertex |
+/// | lacks the factor | 1 | p← | p←, and 1 at the vertex of the merge |
+/// | [`Sums::at_light`] | n p_light / (e c) | 1 / (e c), or 0 for delta lights | 0 |
+/// | [`Sums::at_camera`] | L / q | 0 | 0 |
+/// | [`Sums::arrive`] | · d² / c, or 0 at a delta vertex | / c | / c |
+/// | [`Sums::scatter`] | n_C / p | c / p (last + rest p←) | c / p · pending p←, or c η / p if rough |
+/// | [`Sums::scatter_delta`] | 0 | · c / n² | · c / n² |
+///
+/// SmallVCM merges at every vertex, so its dVC has a term η for each. Its densities of emission per area are
+/// per étendue here.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Sums {
     /// Technique that connects over the latest segment.
     pub last: f32,
     /// Techniques before it.
     pub rest: f32,
-    /// Merge at the latest rough vertex.
-    pub merge: f32,
+    /// Merge at the latest rough vertex, which the next vertex may make void.
+    pub pending_merge: f32,
 }
 
 impl Sums {
@@ -52,13 +64,13 @@ impl Sums {
         Self {
             last: counts.light_samples * pdf_light * inverse,
             rest: if can_be_hit { inverse } else { 0.0 },
-            merge: 0.0,
+            pending_merge: 0.0,
         }
     }
 
     /// Of a camera path that leaves the lens by a ray of density `pdf_pixel` among those of its pixel.
     pub fn at_camera(counts: &Counts, pdf_pixel: f32) -> Self {
-        Self { last: counts.light_paths / pdf_pixel, rest: 0.0, merge: 0.0 }
+        Self { last: counts.light_paths / pdf_pixel, rest: 0.0, pending_merge: 0.0 }
     }
 
     /// At the end of a segment. The first segment of a light path is in [`Sums::at_light`].
@@ -66,22 +78,29 @@ impl Sums {
         Self {
             last: if is_delta { 0.0 } else { self.last * distance_squared / cos_in },
             rest: self.rest / cos_in,
-            merge: self.merge / cos_in,
+            pending_merge: self.pending_merge / cos_in,
         }
     }
 
     /// Sums of a camera path that can be merged at the vertex before, as this vertex shows.
     pub fn with_merge(self) -> Self {
-        Self { rest: self.rest + self.merge, merge: 0.0, ..self }
+        Self { rest: self.rest + self.pending_merge, pending_merge: 0.0, ..self }
     }
 
-    /// After scattering with density `pdf`; `reverse` is the density of the opposite walk, `merge` the count
-    /// of merges there if the vertex is rough.
-    pub fn scatter(self, counts: &Counts, pdf: f32, reverse: f32, cos_out: f32, merge: Option<f32>) -> Self {
+    /// After scattering with density `pdf`; `reverse` is the density of the opposite walk, `eta_vcm` the
+    /// count of merges there if the vertex is rough.
+    pub fn scatter(
+        self,
+        counts: &Counts,
+        pdf: f32,
+        reverse: f32,
+        cos_out: f32,
+        eta_vcm: Option<f32>,
+    ) -> Self {
         Self {
             last: counts.connections / pdf,
             rest: cos_out / pdf * self.before(reverse),
-            merge: cos_out / pdf * merge.unwrap_or(self.merge * reverse),
+            pending_merge: cos_out / pdf * eta_vcm.unwrap_or(self.pending_merge * reverse),
         }
     }
 
@@ -89,7 +108,7 @@ impl Sums {
     /// walk's direction. Refraction keeps n² dA cos dω.
     pub fn scatter_delta(self, cos_in: f32, eta: f32) -> Self {
         let factor = cos_in / (eta * eta);
-        Self { last: 0.0, rest: self.rest * factor, merge: self.merge * factor }
+        Self { last: 0.0, rest: self.rest * factor, pending_merge: self.pending_merge * factor }
     }
 
     /// All techniques of this subpath, where the opposite walk goes on with density `reverse` at the latest
@@ -158,10 +177,14 @@ pub fn weight_of_splat(counts: &Counts, sums: &Sums, pdf_area: f32, reverse: f32
     weight(counts.light_paths, pdf_area * (sums.before(reverse) + merge))
 }
 
-/// Weight of the merge of two subpaths that have arrived at one vertex, where `count` light paths are
-/// expected. Each has its sums and the density of the opposite walk to the vertex before.
-pub fn weight_of_merge(count: f32, (camera, reverse): (&Sums, f32), (light, to_light): (&Sums, f32)) -> f32 {
-    weight(count, camera.before(reverse) + light.before(to_light))
+/// Weight of the merge of two subpaths that have arrived at one vertex, in whose disc `eta_vcm` light paths
+/// are expected. Each has its sums and the density of the opposite walk to the vertex before.
+pub fn weight_of_merge(
+    eta_vcm: f32,
+    (camera, pdf_to_camera): (&Sums, f32),
+    (light, pdf_to_light): (&Sums, f32),
+) -> f32 {
+    weight(eta_vcm, camera.before(pdf_to_camera) + light.before(pdf_to_light))
 }
 
 /// `own` over the sum of `own` and `others`; 0 where that is not a number.

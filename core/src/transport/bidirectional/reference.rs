@@ -20,7 +20,7 @@ use crate::transport::bidirectional::vertex::{
 use crate::transport::settings::PathSettings;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
-use crate::transport::walk::light::{LightWalk, PATHS};
+use crate::transport::walk::light::{LightWalk, PATHS_PER_TASK};
 use crate::transport::walk::termination::{MAX_CROSSINGS, continuation_probability};
 use crate::transport::walk::visibility::shadow_ray;
 use crate::{Level, Rgb};
@@ -73,7 +73,7 @@ impl<'a> Reference<'a> {
         let Self { context, emission, settings, counts, .. } = *self;
         paths.fill(LightPath::default());
         let mut recorder = Recorder { reference: self, paths, stored, count: 0 };
-        let (count, max_depth) = ((counts.light_paths as u32).min(PATHS as u32), settings.max_depth);
+        let (count, max_depth) = ((counts.light_paths as u32).min(PATHS_PER_TASK as u32), settings.max_depth);
         let walk = LightWalk { context, emission, seed: settings.seed, paths: count, max_depth };
         walk.follow(0, sample, scratch, &mut recorder)?;
         Ok(recorder.count)
@@ -296,15 +296,15 @@ impl<'a> Reference<'a> {
         self.emission.light_type(self.context.lights, index)
     }
 
-    /// η at a vertex, and the way by which light comes there from one that `is_narrow`.
+    /// η at a vertex, and the way by which light comes there from one that is a caster if `from_caster`.
     fn merge(
         &self,
         (point, bsdf): (&SurfacePoint, &Bsdf),
         squared: f64,
-        is_narrow: bool,
+        from_caster: bool,
     ) -> (f64, Option<Arrival>) {
-        let count = self.merging.map_or(0.0, |radii| radii.count(bsdf, point.position));
-        let arrival = if count > 0.0 { Arrival::of(is_narrow, squared as f32, count) } else { None };
-        (f64::from(count), arrival)
+        let eta_vcm = self.merging.map_or(0.0, |radii| radii.eta_vcm(bsdf, point.position));
+        let arrival = if eta_vcm > 0.0 { Arrival::of(from_caster, squared as f32, eta_vcm) } else { None };
+        (f64::from(eta_vcm), arrival)
     }
 }

@@ -47,9 +47,8 @@ impl<F: Features> CameraPaths<'_, F> {
         if throughput == Rgb::ZERO {
             return None;
         }
-        let sums = self.leave(vertex, &sample, (direction, towards));
-        (path.last, path.rest, path.merge) = (sums.last, sums.rest, sums.merge);
-        path.merge_count = if sample.delta { 0.0 } else { vertex.merge };
+        path.sums = self.leave(vertex, &sample, (direction, towards));
+        path.eta_vcm = if sample.delta { 0.0 } else { vertex.eta_vcm };
         path.has_rough |= u32::from(!bsdf.is_caustic_caster() && !sample.delta);
         path.throughput = throughput.to_array();
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
@@ -62,7 +61,7 @@ impl<F: Features> CameraPaths<'_, F> {
 
     /// Sums after scattering at `vertex`.
     fn leave(&self, vertex: &Vertex, sample: &BsdfSample, (from, towards): (Vec3, Vec3)) -> Sums {
-        let Vertex { point, bsdf, wo, sums, merge, is_bent, .. } = *vertex;
+        let Vertex { point, bsdf, wo, sums, eta_vcm, is_bent, .. } = *vertex;
         if is_bent {
             return Sums::default();
         }
@@ -72,7 +71,7 @@ impl<F: Features> CameraPaths<'_, F> {
         }
         let cos_out = towards.dot(point.geometric_normal).abs();
         let reverse = reverse_pdf(&self.context, (point, bsdf), wo, sample.direction);
-        let merge = (!bsdf.is_caustic_caster()).then_some(merge);
-        sums.scatter(&self.counts, sample.pdf, reverse, cos_out, merge)
+        let eta_vcm = (!bsdf.is_caustic_caster()).then_some(eta_vcm);
+        sums.scatter(&self.counts, sample.pdf, reverse, cos_out, eta_vcm)
     }
 }

@@ -142,7 +142,7 @@ impl<F: Features> CameraPaths<'_, F> {
         if path.segments + u32::from(light.segments) + 1 > settings.max_depth {
             return None;
         }
-        let Vertex { point, bsdf, wo, sums, is_first_rough, merge, .. } = *vertex;
+        let Vertex { point, bsdf, wo, sums, is_first_rough, eta_vcm, .. } = *vertex;
         let between = Vec3::from(light.position) - point.position;
         let squared = between.length_squared();
         let to_light = between.try_normalize()?;
@@ -167,18 +167,18 @@ impl<F: Features> CameraPaths<'_, F> {
         let cos = |point: &SurfacePoint, direction: Vec3| direction.dot(point.geometric_normal).abs();
         let (cos_camera, cos_light) = (cos(point, to_light), cos(&other, to_light));
         // The one merge of the path: at this vertex, or on the side of the light.
-        let is_narrow = other_bsdf.is_caustic_caster();
-        let Scattering { to_light: pdf, to_camera: reverse, .. } = at_camera;
-        let arrival = Arrival::of(is_narrow, squared, self.near(merge));
+        let from_caster = other_bsdf.is_caustic_caster();
+        let Scattering { pdf_to_light: pdf, pdf_to_camera: reverse, .. } = at_camera;
+        let arrival = Arrival::of(from_caster, squared, self.near(eta_vcm));
         let is_merged = arrival.is_some_and(|arrival| arrival.is_merged(path.segments));
-        let merge = if is_merged { merge } else { 0.0 };
+        let merge = if is_merged { eta_vcm } else { 0.0 };
         let camera_end = End { sums, pdf, reverse, cos: cos_camera, merge };
-        let Scattering { to_light: reverse, to_camera: pdf, .. } = at_light;
+        let Scattering { pdf_to_light: reverse, pdf_to_camera: pdf, .. } = at_light;
         let merge = match is_first_rough || path.has_rough() {
             true => 0.0,
-            false => light.merge * if is_narrow { reverse } else { 1.0 },
+            false => light.sums.pending_merge * if from_caster { reverse } else { 1.0 },
         };
-        let light_end = End { sums: light.sums(), pdf, reverse, cos: cos_light, merge };
+        let light_end = End { sums: light.sums, pdf, reverse, cos: cos_light, merge };
         let weight = weight_of_connection(counts, &camera_end, &light_end, squared);
         let cos_in = cos(&other, light.to_light.into());
         let power = Rgb::from(light.power) * at_light.value * (cos_light / (cos_in * squared));

@@ -30,19 +30,12 @@ pub struct LightVertex {
     pub(super) to_light: [f32; 3],
     /// Barycentric weights of the second and third corner of the triangle.
     pub(super) barycentric: [f32; 2],
-    /// Sums on arrival.
-    pub(super) last: f32,
-    pub(super) rest: f32,
-    /// The merge of paths whose camera vertices are all narrow: still to be multiplied with the reverse
-    /// density if this vertex is narrow.
-    pub(super) merge: f32,
+    /// Sums on arrival. The pending merge is that of paths whose camera vertices are all casters: η at a
+    /// rough vertex; at a caster it lacks the reverse density.
+    pub(super) sums: Sums,
 }
 
 impl LightVertex {
-    pub(super) fn sums(&self) -> Sums {
-        Sums { last: self.last, rest: self.rest, merge: self.merge }
-    }
-
     /// With an `arrival`.
     pub(super) fn with_arrival(self, arrival: Option<Arrival>) -> Self {
         Self { arrival: arrival.map_or(0, |arrival| 1 + arrival as u16), ..self }
@@ -52,8 +45,8 @@ impl LightVertex {
     pub(super) fn arrival(&self) -> Option<Arrival> {
         match self.arrival {
             0 => None,
-            1 => Some(Arrival::Narrow),
-            _ => Some(Arrival::Near),
+            1 => Some(Arrival::FromCaster),
+            _ => Some(Arrival::FromNear),
         }
     }
 
@@ -81,9 +74,9 @@ pub(in crate::transport) struct Scattering {
     /// f(wo, wi) |cos wi|, for radiance that leaves by `wo`.
     pub value: Rgb,
     /// Density with which a camera walk that comes by `wo` goes on to `wi`.
-    pub to_light: f32,
+    pub pdf_to_light: f32,
     /// Density with which a light walk that comes by `wi` goes on to `wo`.
-    pub to_camera: f32,
+    pub pdf_to_camera: f32,
 }
 
 /// Directions in the frame of the other side of a surface.
@@ -99,11 +92,11 @@ pub(in crate::transport) fn scattering<F: Features>(
     wo: Vec3,
     wi: Vec3,
 ) -> Scattering {
-    let (value, to_light) = bsdf.evaluate::<F>(wo, wi);
-    Scattering { value, to_light, to_camera: reverse_pdf(context, (point, bsdf), wo, wi) }
+    let (value, pdf_to_light) = bsdf.evaluate::<F>(wo, wi);
+    Scattering { value, pdf_to_light, pdf_to_camera: reverse_pdf(context, (point, bsdf), wo, wi) }
 }
 
-/// The same for a `bsdf` on the side of the light, as a light path has it.
+/// Scattering for a `bsdf` on the side of the light, as a light path has it.
 pub(in crate::transport) fn scattering_from_light<F: Features>(
     context: &SceneContext<F>,
     (point, bsdf): (&SurfacePoint, &Bsdf),
@@ -117,8 +110,8 @@ pub(in crate::transport) fn scattering_from_light<F: Features>(
         return Scattering::default();
     }
     let behind = Bsdf::at::<F>(context.scene, point.material, point.uv, !point.front);
-    let (value, to_light) = behind.evaluate::<F>(flipped(wo), flipped(wi));
-    Scattering { value, to_light, to_camera: bsdf.evaluate::<F>(wi, wo).1 }
+    let (value, pdf_to_light) = behind.evaluate::<F>(flipped(wo), flipped(wi));
+    Scattering { value, pdf_to_light, pdf_to_camera: bsdf.evaluate::<F>(wi, wo).1 }
 }
 
 /// Density of the walk opposite to one that came by `from` and left by `to`, both local on the side of

@@ -7,7 +7,7 @@ use crate::bvh::Coherence;
 use crate::cache::irradiance::{Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::transport::cached::gather::{GatherPoint, HemisphereSamples};
-use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use glam::{Vec2, Vec3};
 
@@ -28,7 +28,7 @@ const MAX_SLOPE: f32 = 0.5;
 /// two rays of a ring.
 const WALL_FRACTION: f32 = 0.95;
 
-impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     /// Finds walls around a record at `place` by rays, and overhangs around it from the hits of its `strata`,
     /// which are local to `frame`.
     pub(in crate::transport) fn find_boundary(

@@ -2,8 +2,8 @@
 //! record made from them.
 //!
 //! A gather ray finds the light that its hit reflects, by path tracing; light that its hit emits or mirrors
-//! is direct light, which each path of the picture finds itself ([`Components`]). All N² rays of a point form
-//! one or several waves, in blocks of 8 × 8 strata for coherent traversal.
+//! is direct light, which each path of the picture finds itself ([`PathClasses`]). All N² rays of a point
+//! form one or several waves, in blocks of 8 × 8 strata for coherent traversal.
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -16,10 +16,10 @@ use crate::sampling::Sampler;
 use crate::sampling::warp::cosine_hemisphere;
 use crate::scene::SurfacePoint;
 use crate::transport::path::sharing::PathWave;
-use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
-use crate::transport::walk::component::Components;
 use crate::transport::walk::dimension;
+use crate::transport::walk::path_classes::PathClasses;
 use crate::transport::wavefront::{PathState, WAVE};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -118,7 +118,7 @@ impl GatherPoint {
             position: self.position,
             segments: 2,
             triangle: self.triangle,
-            ..PathState::new(pixel, index as u32, sample, Components::REFLECTED)
+            ..PathState::new(pixel, index as u32, sample, PathClasses::REFLECTED)
         }
     }
 }
@@ -178,13 +178,13 @@ impl<F: Features> PathIntegrator<'_, F> {
     }
 
     /// Scratch memory with an estimator.
-    pub fn gather_scratch_with<E: Estimator<F>>(n: usize) -> Footprint {
+    pub fn gather_scratch_with<E: LightEstimator<F>>(n: usize) -> Footprint {
         let wave = PathWave::<E::State, ()>::footprint(n.saturating_mul(n).min(WAVE));
         wave.and(HemisphereSamples::footprint(n))
     }
 }
 
-impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     /// Gathers a record at `place`. Each `number` has different rays. `None` if the irradiance is not finite,
     /// which is counted as dropped.
     ///

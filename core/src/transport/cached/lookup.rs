@@ -6,11 +6,11 @@ use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS, Points
 use crate::scene::SurfacePoint;
 use crate::transport::cached::overhang;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
+use crate::transport::path::estimator::{KnownLight, LightEstimator, RemainingLight};
 use crate::transport::path::vertex::PathVertex;
 use crate::transport::settings::{Counters, PathSettings};
-use crate::transport::walk::component::Components;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::path_classes::PathClasses;
 use crate::transport::wavefront::{BLOCK, Wavefront};
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
@@ -77,7 +77,7 @@ fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &Path
     asks.then_some(path.sample)
 }
 
-impl<F: Features> Estimator<F> for CacheView<'_> {
+impl<F: Features> LightEstimator<F> for CacheView<'_> {
     type State = ();
     type Found = Option<CachedIrradiance>;
 
@@ -128,9 +128,9 @@ impl<F: Features> Estimator<F> for CacheView<'_> {
         _: &mut (),
         found: Option<CachedIrradiance>,
         add: &mut impl FnMut(KnownLight),
-    ) -> Rest {
+    ) -> RemainingLight {
         let (Some(indirect), Bsdf::Diffuse(diffuse)) = (found, &vertex.bsdf) else {
-            return Rest::all(vertex);
+            return RemainingLight::all(vertex);
         };
         let contribution = vertex.throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI;
         add(KnownLight { contribution, blur: Rgb::ZERO });
@@ -140,7 +140,7 @@ impl<F: Features> Estimator<F> for CacheView<'_> {
         let has_environment = context.scene.environment.is_some();
         let ends = indirect.shining < SMALL && !context.has_mirrors && !has_environment;
         let light_samples = if ends || has_environment { self.light_samples(context) } else { 1 };
-        Rest { light_samples, ends, ..Rest::of(Components::DIRECT) }
+        RemainingLight { light_samples, ends, ..RemainingLight::of(PathClasses::DIRECT) }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::cache::irradiance::{OVERHANG_DISTANCE_FACTOR, OVERHANG_RADIUS_FACTOR,
 use crate::geometry::{Frame, Hit, Ray};
 use crate::scene::{Surface, SurfacePoint};
 use crate::transport::cached::gather::GatherPoint;
-use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::wavefront::BLOCK;
@@ -102,7 +102,7 @@ fn is_overhang<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
         })
 }
 
-impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     /// Measures the height of overhangs above each of `places`, up to the maximum distance to records.
     pub fn measure_overhangs(&self, places: &mut [GatherPoint], counters: &mut Counters) {
         let length = MAX_DISTANCE * self.context.bvh.bounds().diagonal();

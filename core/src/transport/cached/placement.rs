@@ -7,7 +7,7 @@ use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::cached::gather::GatherPoint;
-use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::Segment;
 use crate::transport::walk::dimension;
@@ -79,7 +79,7 @@ impl ProgressiveOrder {
     }
 }
 
-impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     /// First diffuse points that sample `sample` of the pixels of [`PIXELS`] steps from `first` sees in the
     /// way `sight`, written to `out` in order. A step without pixel or diffuse point gives a place without
     /// triangle ([`GatherPoint::is_some`]).

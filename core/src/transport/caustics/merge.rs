@@ -48,7 +48,7 @@ use crate::light::{EmissionSampler, LightSample};
 use crate::photon::{Kernel, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::estimator::{EmissionHit, Estimator, KnownLight, Rest};
+use crate::transport::path::estimator::{EmissionHit, KnownLight, LightEstimator, RemainingLight};
 use crate::transport::path::sharing::Sharing;
 use crate::transport::path::vertex::PathVertex;
 use crate::transport::photon_mapping::density::{Light, RadianceEstimate, reflected};
@@ -217,7 +217,7 @@ impl<'a> CausticMerging<'a> {
     }
 }
 
-impl<F: Features> Estimator<F> for CausticMerging<'_> {
+impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
     type State = MergingState;
     type Found = ();
     const SEPARATES_COATS: bool = true;
@@ -230,7 +230,7 @@ impl<F: Features> Estimator<F> for CausticMerging<'_> {
         state: &mut MergingState,
         _: (),
         add: &mut impl FnMut(KnownLight),
-    ) -> Rest {
+    ) -> RemainingLight {
         let PathVertex { point, ref bsdf, wo, segments, .. } = *vertex;
         state.here = state.progress;
         if state.progress.may_come() {
@@ -243,7 +243,7 @@ impl<F: Features> Estimator<F> for CausticMerging<'_> {
                 add(gathered.known(vertex));
             }
         }
-        Rest::all(vertex)
+        RemainingLight::all(vertex)
     }
 
     #[inline]
@@ -314,7 +314,7 @@ impl<F: Features> Estimator<F> for CausticMerging<'_> {
     }
 }
 
-impl<'a, F: Features, E: Estimator<F, State = ()>, R: Sharing> PathIntegrator<'a, F, E, R> {
+impl<'a, F: Features, E: LightEstimator<F, State = ()>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// The same, merged with photons of caustics.
     pub fn with_caustics(
         &self,

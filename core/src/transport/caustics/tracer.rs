@@ -19,7 +19,7 @@ use crate::transport::photon_mapping::deposit::PhotonTracerSettings;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::{Counters, UNLIMITED};
 use crate::transport::walk::context::SceneContext;
-pub use crate::transport::walk::light::PATHS;
+pub use crate::transport::walk::light::PATHS_PER_TASK;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
 use crate::transport::walk::mis::{ChainLink, merging_weight};
 use crate::{Level, Rgb};
@@ -28,7 +28,7 @@ use core::f32::consts::PI;
 use glam::{Vec2, Vec3};
 
 /// Photons that a task has room for: a path leaves two on average at most.
-pub const ROOM: usize = 3 * PATHS;
+pub const PHOTONS_PER_TASK: usize = 3 * PATHS_PER_TASK;
 
 /// Probability with which a path goes on, at most, where it leaves a photon.
 const MOST: f32 = 0.5;
@@ -47,7 +47,7 @@ const REFLECTED: f32 = 0.5;
 const MOST_GLASS: u32 = 16;
 const NEAR: f32 = 1e-4;
 
-/// Shoots photons of caustics: a pass of tasks of [`PATHS`] paths.
+/// Shoots photons of caustics: a pass of tasks of [`PATHS_PER_TASK`] paths.
 #[derive(Clone, Copy)]
 pub struct CausticPhotonTracer<'a, F> {
     flight: LightWalk<'a, F>,
@@ -117,7 +117,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     }
 
     /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is
-    /// not needed, with photons of no place, which a map refuses. Room for [`ROOM`] is enough.
+    /// not needed, with photons of no place, which a map refuses. Room for [`PHOTONS_PER_TASK`] is enough.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`CausticPhotonTracer::scratch`] bytes.
@@ -141,7 +141,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     }
 
     /// Shoots the same photons to see where those are from that show in the picture. `out` gets one for each
-    /// path, up to [`PATHS`].
+    /// path, up to [`PATHS_PER_TASK`].
     ///
     /// # Errors
     /// As [`CausticPhotonTracer::run`].
@@ -152,7 +152,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         scratch: &mut Arena,
         out: &mut [GuideSample],
     ) -> Result<Counters, OutOfMemory> {
-        let first = (task * PATHS) as u32;
+        let first = (task * PATHS_PER_TASK) as u32;
         out.fill(GuideSample::default());
         let leave = |state: &LightPathState, photon: Photon, share: CausticShare, _: &mut Counters| {
             if let Some(find) = out.get_mut((state.number - first) as usize) {
@@ -207,10 +207,11 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
 
     /// The share that photons have in the light of this path at `place`.
     fn share(&self, state: &LightPathState, place: Vec3) -> CausticShare {
-        let ratio = state.others / (self.discs.merge_factor(place, self.flight.paths as f32) * state.chain);
+        let ratio =
+            state.path_pdfs / (self.discs.merge_factor(place, self.flight.paths as f32) * state.chain_ratio);
         let weight = merging_weight(ratio);
         // Zero over zero: without any other technique photons have it all.
-        let weight = if state.others == 0.0 { 1.0 } else { weight };
+        let weight = if state.path_pdfs == 0.0 { 1.0 } else { weight };
         CausticShare { weight, chance: (weight / LEAST_WEIGHT).min(1.0), ratio }
     }
 
@@ -273,8 +274,8 @@ impl CausticShare {
     }
 }
 
-/// `LightPathState::others` of a path that a rough surface has scattered: its power has its weight, and
-/// `LightPathState::chain` is the radius of discs at the last.
+/// `LightPathState::path_pdfs` of a path that a rough surface has scattered: its power has its weight, and
+/// `LightPathState::chain_ratio` is the radius of discs at the last.
 const SCATTERED: f32 = -1.0;
 
 /// Leaves photons with their weights.
@@ -289,13 +290,14 @@ impl<F: Features, L> MisDepositor<'_, '_, F, L> {
     /// Whether light is gathered at `vertex`, which is rough, and not where it was scattered last.
     fn is_merged(&self, state: &LightPathState, vertex: &Vertex) -> bool {
         let LightWalk { max_depth, .. } = self.shooter.flight;
-        let from = if state.others == SCATTERED && max_depth == UNLIMITED { state.chain } else { 0.0 };
+        let from =
+            if state.path_pdfs == SCATTERED && max_depth == UNLIMITED { state.chain_ratio } else { 0.0 };
         is_wide_enough(self.shooter.discs.radius(vertex.point.position), from)
     }
 
     /// What is known of a photon at `vertex`, which is rough.
     fn share(&self, state: &LightPathState, vertex: &Vertex) -> CausticShare {
-        match state.others {
+        match state.path_pdfs {
             SCATTERED => CausticShare::ALL,
             _ => self.shooter.share(state, vertex.point.position),
         }
@@ -316,7 +318,7 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         counters: &mut Counters,
     ) -> Option<Continuation> {
         let ends = vertex.bsdf.is_receiver();
-        let is_known = self.shooter.beside_records && state.mirrored == 0;
+        let is_known = self.shooter.beside_records && state.from_caster == 0;
         let leaves = ends && state.segments > 1 && !is_known;
         if leaves && self.is_merged(state, vertex) {
             let share = self.share(state, vertex);
@@ -326,7 +328,7 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         }
         Some(Continuation {
             most: if leaves { MOST } else { 1.0 },
-            mirrored: ends && !(leaves && self.goes_on),
+            specular_only: ends && !(leaves && self.goes_on),
         })
     }
 
@@ -345,30 +347,31 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         state: &mut LightPathState,
         vertex: &Vertex,
         from: Vec3,
-        (sample, is_narrow): (&BsdfSample, bool),
+        (sample, is_specular): (&BsdfSample, bool),
     ) {
-        state.mirrored = vertex.bsdf.is_delta().into();
-        if vertex.bsdf.is_receiver() && !is_narrow {
-            if state.others != SCATTERED {
+        state.from_caster = vertex.bsdf.is_delta().into();
+        if vertex.bsdf.is_receiver() && !is_specular {
+            if state.path_pdfs != SCATTERED {
                 // What goes on is what was left.
                 let kept = self.share(state, vertex).kept(vertex).unwrap_or(0.0);
                 state.power = (Rgb::from(state.power) * kept).to_array();
             }
-            (state.others, state.chain) = (SCATTERED, self.shooter.discs.radius(vertex.point.position));
+            (state.path_pdfs, state.chain_ratio) =
+                (SCATTERED, self.shooter.discs.radius(vertex.point.position));
         }
-        if state.others == SCATTERED {
+        if state.path_pdfs == SCATTERED {
             return;
         }
         // The way back, as the path tracer goes it.
         let Vertex { point, bsdf, .. } = *vertex;
-        let coat_alone = is_narrow && !sample.delta;
+        let coat_alone = is_specular && !sample.delta;
         let there = ChainLink { point, bsdf, near: from, far: sample.direction, coat_alone };
         let back = if sample.delta { 1.0 } else { there.pdf(&self.shooter.flight.context) };
         if state.segments == 1 {
             let back = (!sample.delta).then_some(back);
-            (state.chain, state.others) = self.shooter.first(state, vertex, back);
+            (state.chain_ratio, state.path_pdfs) = self.shooter.first(state, vertex, back);
         }
-        state.chain *= if sample.delta {
+        state.chain_ratio *= if sample.delta {
             sample.eta * sample.eta
         } else {
             sample.pdf / back * (from.z / sample.direction.z).abs()

@@ -13,7 +13,7 @@ use crate::transport::bidirectional::light_pass::lens_point;
 use crate::transport::bidirectional::vertex::scattering_from_light;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::light::{LightPathState, PATHS, Vertex};
+use crate::transport::walk::light::{LightPathState, PATHS_PER_TASK, Vertex};
 use crate::transport::walk::visibility::ShadowRays;
 
 /// The splats of a task, of each light path one at most, until their shadow rays are traced.
@@ -26,21 +26,21 @@ pub(super) struct CausticSplats<'w> {
 impl<'w> CausticSplats<'w> {
     pub(super) fn footprint() -> Footprint {
         Footprint::default()
-            .slice::<Ray>(PATHS)
-            .slice::<[f32; 3]>(PATHS)
-            .slice::<Hit>(PATHS)
-            .slice::<u8>(PATHS)
-            .slice::<Splat>(PATHS)
+            .slice::<Ray>(PATHS_PER_TASK)
+            .slice::<[f32; 3]>(PATHS_PER_TASK)
+            .slice::<Hit>(PATHS_PER_TASK)
+            .slice::<u8>(PATHS_PER_TASK)
+            .slice::<Splat>(PATHS_PER_TASK)
     }
 
     pub(super) fn new(arena: &mut Arena<'w>) -> Result<Self, OutOfMemory> {
         let shadows = ShadowRays {
-            rays: arena.slice(PATHS)?,
-            light: arena.slice(PATHS)?,
-            hits: arena.slice(PATHS)?,
-            hidden: arena.slice(PATHS)?,
+            rays: arena.slice(PATHS_PER_TASK)?,
+            light: arena.slice(PATHS_PER_TASK)?,
+            hits: arena.slice(PATHS_PER_TASK)?,
+            hidden: arena.slice(PATHS_PER_TASK)?,
         };
-        Ok(Self { shadows, splats: arena.slice(PATHS)?, pending: 0 })
+        Ok(Self { shadows, splats: arena.slice(PATHS_PER_TASK)?, pending: 0 })
     }
 
     /// Adds the splat of `vertex`, if the picture has a pixel there.

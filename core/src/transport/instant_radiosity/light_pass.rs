@@ -13,7 +13,7 @@ use crate::transport::walk::light::{
 };
 use bytemuck::{Pod, Zeroable};
 
-pub use crate::transport::walk::light::{PATHS, ROOM};
+pub use crate::transport::walk::light::{PATHS_PER_TASK, VERTICES_PER_TASK};
 
 /// The outcome of a task beside its virtual lights and splats.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -62,9 +62,9 @@ impl<'a, F: Features> LightPass<'a, F> {
         LightWalk::<F>::scratch().and(CausticSplats::footprint())
     }
 
-    /// Makes set number `task` of pass number `pass` in `lights`, which has room for [`ROOM`], and the splats
-    /// of hidden caustics, sorted by strips, in `splats`, with room for [`PATHS`]; none where that is empty.
-    /// Each set by itself stands for all light, all splats together do.
+    /// Makes set number `task` of pass number `pass` in `lights`, which has room for [`VERTICES_PER_TASK`],
+    /// and the splats of hidden caustics, sorted by strips, in `splats`, with room for [`PATHS_PER_TASK`];
+    /// none where that is empty. Each set by itself stands for all light, all splats together do.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`LightPass::scratch`].
@@ -86,7 +86,7 @@ impl<'a, F: Features> LightPass<'a, F> {
             context,
             emission,
             seed: settings.seed,
-            paths: (self.sets * PATHS) as u32,
+            paths: (self.sets * PATHS_PER_TASK) as u32,
             max_depth: settings.max_depth,
         };
         let mut counters = walk.follow(task, pass, &mut arena, &mut writer)?;
@@ -119,7 +119,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
     ) -> Option<Continuation> {
         let LightPass { context, emission, settings, .. } = self.pass;
         // Mirrors and smooth glass alone have led it here.
-        let is_hidden = state.mirrored == 1
+        let is_hidden = state.from_caster == 1
             && !vertex.bsdf.is_delta()
             && emission.light_type(context.lights, state.light) == LightType::Delta;
         if is_hidden && let Some(caustics) = &mut self.caustics {
@@ -134,11 +134,11 @@ impl<F: Features> Visitor for Writer<'_, F> {
                 None => counters.dropped.unfinished += 1,
             }
         }
-        Some(Continuation { most: MAX_CONTINUATION, mirrored: false })
+        Some(Continuation { most: MAX_CONTINUATION, specular_only: false })
     }
 
     fn leave(&self, state: &mut LightPathState, _: &Vertex, _: glam::Vec3, (sample, _): (&BsdfSample, bool)) {
-        let is_mirrored = sample.delta && (state.segments == 1 || state.mirrored == 1);
-        state.mirrored = u32::from(is_mirrored);
+        let is_mirrored = sample.delta && (state.segments == 1 || state.from_caster == 1);
+        state.from_caster = u32::from(is_mirrored);
     }
 }

@@ -19,7 +19,7 @@ use crate::geometry::Ray;
 use crate::light::luminance;
 use crate::sampling::ONE_MINUS_EPSILON;
 use crate::scene::SurfacePoint;
-use crate::transport::path::estimator::Estimator;
+use crate::transport::path::estimator::LightEstimator;
 use crate::transport::path::vertex::PathVertex;
 use crate::transport::path::{PathIntegrator, Sharing};
 use crate::transport::settings::PathSettings;
@@ -109,7 +109,7 @@ impl VirtualLighting<'_> {
     }
 }
 
-impl<F: Features> Estimator<F> for VirtualLighting<'_> {
+impl<F: Features> LightEstimator<F> for VirtualLighting<'_> {
     type State = LightingState;
     type Found = ();
 
@@ -191,7 +191,7 @@ impl<F: Features> Estimator<F> for VirtualLighting<'_> {
     }
 }
 
-impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// The same, lit by virtual lights.
     pub fn with_virtual_lights<'l>(
         &self,

@@ -1,7 +1,7 @@
 //! Markov chains in primary sample space, all of a task in lockstep, so that the tracer sees batches of rays.
 
+use super::bootstrap::Bootstrap;
 use super::lanes::{LANES, Lanes};
-use super::look::Look;
 use super::numbers::{NUMBERS, Point, Source};
 use super::target::{Step, Value};
 use crate::Rgb;
@@ -71,7 +71,7 @@ struct Chain {
 /// Runs the chains of a sample of the picture.
 #[derive(Clone, Copy)]
 pub struct Chains<'a, F> {
-    look: Look<'a, F>,
+    bootstrap: Bootstrap<'a, F>,
     seed: u32,
     sample: u32,
     pixels: usize,
@@ -82,21 +82,21 @@ pub struct Chains<'a, F> {
 }
 
 impl<'a, F: Features> Chains<'a, F> {
-    /// Chains of `mutations` that start from points of `look`, for a film of `pixels`; `scale` is the
+    /// Chains of `mutations` that start from points of `bootstrap`, for a film of `pixels`; `scale` is the
     /// radiance that one visit of density 1 brings to a pixel.
     pub fn new(
-        look: Look<'a, F>,
+        bootstrap: Bootstrap<'a, F>,
         (seed, sample): (u32, u32),
         pixels: usize,
         mutations: u32,
         scale: f32,
     ) -> Self {
-        Self { look, seed, sample, pixels, mutations, scale }
+        Self { bootstrap, seed, sample, pixels, mutations, scale }
     }
 
     /// Working memory of a task.
     pub fn scratch(mutations: usize) -> Footprint {
-        Look::<F>::scratch()
+        Bootstrap::<F>::scratch()
             .slice::<f32>(LANES * NUMBERS)
             .slice::<Value>(LANES)
             .slice::<Chain>(LANES)
@@ -124,17 +124,17 @@ impl<'a, F: Features> Chains<'a, F> {
         let chains: &mut [Chain] = &mut arena.slice(LANES)?[..starts.len()];
         let mut list = List { splats: arena.slice(room(self.mutations as usize))?, count: 0 };
         let mut counters = Counters::default();
-        let Self { look, mutations, scale, .. } = *self;
-        let target = look.target;
+        let Self { bootstrap, mutations, scale, .. } = *self;
+        let target = bootstrap.target;
 
-        look.evaluate(|lane| starts[lane], current, &mut lanes, values, &mut counters);
+        bootstrap.evaluate(|lane| starts[lane], current, &mut lanes, values, &mut counters);
         let seed = mix(SEED ^ u64::from(self.seed)).wrapping_add(u64::from(self.sample) << 32);
         for (lane, (chain, value)) in chains.iter_mut().zip(&*values).enumerate() {
             *chain = Chain {
                 value: *value,
                 density: target.density(value),
                 weight: 0.0,
-                segments: look.length(starts[lane]).0,
+                segments: bootstrap.length(starts[lane]).0,
                 key: mix(seed.wrapping_add((task * LANES + lane) as u64)) as u32,
             };
         }

@@ -75,7 +75,7 @@ impl<F: Features> Walk<'_, F> {
         if subpath.segments > 1 {
             let pdf = (subpath.pdf < f32::INFINITY).then_some(subpath.pdf);
             let (pdf_light, density) = densities();
-            weight = weight_of_hit(&self.counts, &subpath.sums(), pdf, pdf_light, density);
+            weight = weight_of_hit(&self.counts, &subpath.sums, pdf, pdf_light, density);
             of_paths = weight_of_hit(&PATH_TRACING, &Sums::default(), pdf, pdf_light, 0.0);
         }
         contribution(Rgb::from(subpath.throughput) * radiance * weight, weight / of_paths)
@@ -141,21 +141,21 @@ impl<F: Features> Walk<'_, F> {
         }
         let camera_end = End {
             sums: vertex.sums[0],
-            pdf: at_camera.to_light,
-            reverse: at_camera.to_camera,
+            pdf: at_camera.pdf_to_light,
+            reverse: at_camera.pdf_to_camera,
             cos: vertex.cos(towards),
             merge: 0.0,
         };
         let light_end = End {
-            sums: light.sums(),
-            pdf: at_light.to_camera,
-            reverse: at_light.to_light,
+            sums: light.sums,
+            pdf: at_light.pdf_to_camera,
+            reverse: at_light.pdf_to_light,
             cos: other.cos(towards),
             merge: 0.0,
         };
         let weight = weight_of_connection(counts, &camera_end, &light_end, squared);
         let pdf_area = camera_end.pdf * light_end.cos / squared;
-        let by_paths = weight * pdf_area * light.path_sums().before(light_end.reverse);
+        let by_paths = weight * pdf_area * light.path_sums.before(light_end.reverse);
         let power = Rgb::from(light.throughput) * at_light.value;
         let power = power * (light_end.cos / (other.cos(other.back) * squared));
         // The power of a light subpath is over the number of pixels, as if all of them were traced.
@@ -194,8 +194,8 @@ impl<F: Features> Walk<'_, F> {
         let scattering = scattering_from_light(&context, (point, bsdf), wo, *wi);
         let pixels = width as f32 * height as f32;
         let pdf_area = pixels * seen.pdf * vertex.cos(to_camera) / seen.distance / seen.distance;
-        let weight = weight_of_splat(&counts, sums, pdf_area, scattering.to_light, 0.0);
-        let by_paths = weight * pdf_area * path_sums.before(scattering.to_light) / counts.light_paths;
+        let weight = weight_of_splat(&counts, sums, pdf_area, scattering.pdf_to_light, 0.0);
+        let by_paths = weight * pdf_area * path_sums.before(scattering.pdf_to_light) / counts.light_paths;
         let power = Rgb::from(light.throughput) * scattering.value;
         let radiance = power * (pdf_area * weight / vertex.cos(*back));
         let ray = point.spawn_to(lens_point(camera, lens, point.position, &seen));

@@ -42,30 +42,9 @@ pub(super) struct Subpath {
     /// Light that a light subpath left.
     pub light: u32,
     /// Sums after the last scattering, or on arrival where the subpath has ended.
-    last: f32,
-    rest: f32,
+    pub sums: Sums,
     /// The sums of the techniques of path tracing alone.
-    path_last: f32,
-    path_rest: f32,
-}
-
-impl Subpath {
-    #[inline]
-    pub(super) fn sums(&self) -> Sums {
-        Sums { last: self.last, rest: self.rest, merge: 0.0 }
-    }
-
-    #[inline]
-    pub(super) fn path_sums(&self) -> Sums {
-        Sums { last: self.path_last, rest: self.path_rest, merge: 0.0 }
-    }
-
-    /// Sets the sums of all techniques and those of path tracing.
-    #[inline]
-    fn set(&mut self, [all, paths]: [Sums; 2]) {
-        (self.last, self.rest) = (all.last, all.rest);
-        (self.path_last, self.path_rest) = (paths.last, paths.rest);
-    }
+    pub path_sums: Sums,
 }
 
 /// The end of a ray.
@@ -231,7 +210,7 @@ impl<'a, F: Features> Walk<'a, F> {
         let is_delta = vertex.bsdf.is_delta();
         if subpath.segments > 1 {
             let squared = point.position.distance_squared(subpath.position.into());
-            return subpath.sums().arrive(squared, cos, is_delta);
+            return subpath.sums.arrive(squared, cos, is_delta);
         }
         let end = End { point, bsdf: &vertex.bsdf, cos };
         sums_from_camera(&self.context, &self.counts, self.size, lens, end)
@@ -255,7 +234,7 @@ impl<'a, F: Features> Walk<'a, F> {
             }
             _ => {
                 let squared = vertex.point.position.distance_squared(subpath.position.into());
-                [subpath.sums(), subpath.path_sums()].map(|sums| sums.arrive(squared, cos, is_delta))
+                [subpath.sums, subpath.path_sums].map(|sums| sums.arrive(squared, cos, is_delta))
             }
         };
         Some(vertex)
@@ -297,7 +276,7 @@ impl<'a, F: Features> Walk<'a, F> {
             return None;
         }
         let sums = self.sums_after(vertex, &sample, towards, from_light);
-        subpath.set(sums);
+        [subpath.sums, subpath.path_sums] = sums;
         subpath.throughput = throughput.to_array();
         subpath.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
         subpath.position = point.position.to_array();
@@ -327,6 +306,6 @@ impl<'a, F: Features> Walk<'a, F> {
 
     /// Ends a light subpath at `vertex`: it keeps the sums on arrival.
     pub(super) fn end(&self, subpath: &mut Subpath, vertex: &Vertex) {
-        subpath.set(vertex.sums);
+        [subpath.sums, subpath.path_sums] = vertex.sums;
     }
 }

@@ -1,6 +1,6 @@
 //! Lengths, techniques and the division of light.
 
-use super::look::Lengths;
+use super::bootstrap::Lengths;
 use super::split::{Contribution, Split};
 use crate::Rgb;
 use std::vec::Vec;

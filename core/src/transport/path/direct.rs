@@ -2,7 +2,7 @@
 //! (Veach 1997, chapter 9).
 
 use super::PathIntegrator;
-use super::estimator::{Estimator, Rest};
+use super::estimator::{LightEstimator, RemainingLight};
 use super::sharing::Sharing;
 use super::vertex::PathVertex;
 use crate::Rgb;
@@ -17,14 +17,14 @@ use crate::transport::wavefront::Wavefront;
 use crate::transport::wavefront::driver::TO_ENVIRONMENT;
 use glam::Vec3;
 
-impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
+impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Takes light samples at `vertex` and queues their shadow rays.
     #[inline]
     pub(super) fn direct(
         &self,
         (state, shared): (&E::State, &mut R::State),
         vertex: &PathVertex,
-        rest: &Rest,
+        rest: &RemainingLight,
         wave: &mut Wavefront,
     ) {
         let (scene, lights) = (self.context.scene, self.context.lights);
@@ -71,7 +71,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         &self,
         (state, shared): (&E::State, &mut R::State),
         vertex: &PathVertex,
-        rest: &Rest,
+        rest: &RemainingLight,
         (sample, later): (&LightSample, bool),
     ) -> Option<(Ray, Rgb)> {
         let PathVertex { point, ref bsdf, wo, apart, throughput, .. } = *vertex;

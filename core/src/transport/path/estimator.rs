@@ -1,5 +1,5 @@
-//! Interface between the path tracer and the methods that build on it: an [`Estimator`] supplies part of the
-//! light at a vertex from a data structure, and the path finds the rest.
+//! Interface between the path tracer and the methods that build on it: a [`LightEstimator`] supplies part of
+//! the light at a vertex from a data structure, and the path finds the rest.
 
 use super::vertex::PathVertex;
 use crate::Rgb;
@@ -8,8 +8,8 @@ use crate::geometry::Ray;
 use crate::light::LightSample;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::{Counters, PathSettings};
-use crate::transport::walk::component::Components;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::path_classes::PathClasses;
 use crate::transport::wavefront::{BLOCK, Wavefront};
 use bytemuck::Pod;
 use core::ops::Range;
@@ -26,11 +26,11 @@ pub struct KnownLight {
 
 /// Light that the path still has to find behind a vertex.
 #[derive(Clone, Copy, Debug)]
-pub struct Rest {
+pub struct RemainingLight {
     /// Classes behind the wide lobes of the surface; `None` if the estimator supplies all of them.
-    pub(in crate::transport) wide: Option<Components>,
+    pub(in crate::transport) wide: Option<PathClasses>,
     /// Classes behind a mirror or a narrow coat.
-    pub(in crate::transport) narrow: Components,
+    pub(in crate::transport) narrow: PathClasses,
     /// True if the estimator supplies direct light, except through a narrow coat.
     pub(in crate::transport) is_lit: bool,
     /// Number of light samples of next-event estimation.
@@ -39,7 +39,7 @@ pub struct Rest {
     pub(in crate::transport) ends: bool,
 }
 
-impl Rest {
+impl RemainingLight {
     /// All light that the path of `vertex` still has to find.
     #[inline]
     pub(in crate::transport) fn all(vertex: &PathVertex) -> Self {
@@ -48,7 +48,7 @@ impl Rest {
 
     /// Light of `classes`.
     #[inline]
-    pub(in crate::transport) fn of(classes: Components) -> Self {
+    pub(in crate::transport) fn of(classes: PathClasses) -> Self {
         Self { wide: Some(classes), narrow: classes, is_lit: false, light_samples: 1, ends: false }
     }
 
@@ -76,7 +76,7 @@ pub enum EmissionHit {
 
 /// Extension of path tracing by a method, at the vertices where light enters a path. The defaults add
 /// nothing: with `()` the integrator is the plain path tracer.
-pub trait Estimator<F: Features>: Copy + Send + Sync {
+pub trait LightEstimator<F: Features>: Copy + Send + Sync {
     /// State per path beside the state of the path tracer; zero at the start.
     type State: Pod;
     /// Result of the lookup for a vertex.
@@ -142,8 +142,8 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
         _state: &mut Self::State,
         _found: Self::Found,
         _add: &mut impl FnMut(KnownLight),
-    ) -> Rest {
-        Rest::all(vertex)
+    ) -> RemainingLight {
+        RemainingLight::all(vertex)
     }
 
     /// MIS weight of emission hit by BSDF sampling, given its `weight` in plain path tracing.
@@ -183,13 +183,13 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
     }
 }
 
-impl<F: Features> Estimator<F> for () {
+impl<F: Features> LightEstimator<F> for () {
     type State = ();
     type Found = ();
 }
 
 /// Pair of estimators, the first of them stateless: a cache, and merging beside it.
-impl<F: Features, A: Estimator<F, State = ()>, B: Estimator<F>> Estimator<F> for (A, B) {
+impl<F: Features, A: LightEstimator<F, State = ()>, B: LightEstimator<F>> LightEstimator<F> for (A, B) {
     type State = B::State;
     type Found = (A::Found, B::Found);
     const SEPARATES_COATS: bool = A::SEPARATES_COATS || B::SEPARATES_COATS;
@@ -222,7 +222,7 @@ impl<F: Features, A: Estimator<F, State = ()>, B: Estimator<F>> Estimator<F> for
         state: &mut Self::State,
         found: Self::Found,
         add: &mut impl FnMut(KnownLight),
-    ) -> Rest {
+    ) -> RemainingLight {
         let rest = self.0.at_vertex(scene, vertex, &mut (), found.0, add);
         if rest.ends {
             return rest;

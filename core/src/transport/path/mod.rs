@@ -6,7 +6,7 @@
 //! 2. Shadow rays are traced after all vertices of the wave are shaded; their light is added to the path
 //!    then.
 //! 3. Code for features that the scene does not have is not compiled in ([`Features`]).
-//! 4. An [`Estimator`] supplies part of the light at a vertex: a cache, photon maps, or photons to merge
+//! 4. An [`LightEstimator`] supplies part of the light at a vertex: a cache, photon maps, or photons to merge
 //!    with. Without one the result equals the plain algorithm to the bit.
 //! 5. If it pays, pixels of a circle share the light that their paths find ([`PathReuse`]).
 //! 6. Pixels on the border of a lamp trace extra rays for its emission (`silhouette.rs`).
@@ -30,7 +30,7 @@ pub(in crate::transport) mod tile;
 pub(in crate::transport) mod vertex;
 
 pub use crate::transport::wavefront::WAVE;
-pub use estimator::Estimator;
+pub use estimator::LightEstimator;
 pub use reuse::PathReuse;
 pub use sharing::Sharing;
 
@@ -78,12 +78,12 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     }
 
     /// Scratch memory with an estimator and a sharing rule.
-    pub fn scratch_with<E: Estimator<F>, R: Sharing>(wave: usize) -> Footprint {
+    pub fn scratch_with<E: LightEstimator<F>, R: Sharing>(wave: usize) -> Footprint {
         PathWave::<E::State, R>::footprint(wave)
     }
 }
 
-impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// This path tracer with another estimator.
     pub(in crate::transport) fn with_estimator<O>(&self, estimator: O) -> PathIntegrator<'a, F, O, R> {
         let Self { context, settings, sharing, .. } = *self;

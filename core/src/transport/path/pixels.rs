@@ -1,7 +1,7 @@
 //! Path tracing of scattered single pixels for an audit ([`crate::estimate`]).
 
 use super::PathIntegrator;
-use super::estimator::Estimator;
+use super::estimator::LightEstimator;
 use super::sharing::PathWave;
 use super::silhouette::is_on_silhouette;
 use crate::Rgb;
@@ -11,7 +11,7 @@ use crate::memory::{Arena, OutOfMemory};
 use crate::transport::settings::Counters;
 use core::ops::Range;
 
-impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     /// Traces `samples` of the pixels in these columns and rows, and adds them to `out`, in the order of
     /// `pixels`.
     ///

@@ -19,7 +19,7 @@
 
 use super::PathIntegrator;
 use super::connection::{ConnectionVertex, density};
-use super::estimator::Estimator;
+use super::estimator::LightEstimator;
 use super::sharing::{PathMemory, PathWave, Sharing};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, CoatTransmittance, Features};
@@ -372,14 +372,14 @@ fn end_of_circle(states: &[ReuseState], first: usize) -> usize {
     first + states[first..].iter().take_while(members).count()
 }
 
-impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// This path tracer with path reuse: pixels of a circle share the light that their paths find.
     pub fn with_reuse(&self) -> PathIntegrator<'a, F, E, PathReuse> {
         self.with_sharing(PathReuse { firefly_limit: f32::INFINITY })
     }
 }
 
-impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E, PathReuse> {
+impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E, PathReuse> {
     /// This path tracer with a firefly limit: samples much brighter than the `mean` radiance of the picture
     /// are shared in part only.
     pub fn with_firefly_limit(&self, mean: f32) -> Self {

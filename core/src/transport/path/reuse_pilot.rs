@@ -5,7 +5,7 @@
 //! direct light, or behind mirrors and glass.
 
 use super::PathIntegrator;
-use super::estimator::Estimator;
+use super::estimator::LightEstimator;
 use super::reuse::PathReuse;
 use super::sharing::PathWave;
 use super::sharing::Sharing;
@@ -15,7 +15,7 @@ use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Tile};
 use crate::memory::{Arena, OutOfMemory};
 use crate::transport::settings::Counters;
-use crate::transport::walk::component::Components;
+use crate::transport::walk::path_classes::PathClasses;
 use bytemuck::Pod;
 
 /// Samples per pixel of the pilot. The mean radiance of the picture comes from sample 0 alone.
@@ -111,7 +111,7 @@ impl core::ops::AddAssign for Pilot {
     }
 }
 
-impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     /// Tiles of the pilot, spread over the picture.
     pub fn pilot_tasks(&self) -> impl Iterator<Item = usize> + use<F, E> {
         let (tasks, pilots) = (self.tasks(), self.tasks().min(PILOT_TILES));
@@ -132,13 +132,13 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     /// # Errors
     /// As [`PathIntegrator::pilot_mean`].
     pub fn pilot_rest(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
-        self.mean_of(Some(Components::WITHOUT_VISIBLE_EMITTERS), task, wave, scratch)
+        self.mean_of(Some(PathClasses::WITHOUT_VISIBLE_EMITTERS), task, wave, scratch)
     }
 
     /// Mean radiance of the classes `components`, or of all light.
     fn mean_of(
         &self,
-        components: Option<Components>,
+        components: Option<PathClasses>,
         task: usize,
         wave: usize,
         scratch: &mut Arena,

@@ -1,7 +1,7 @@
 //! Next direction of a path: BSDF sampling, Russian roulette, and the MIS quantities of the next vertex.
 
 use super::PathIntegrator;
-use super::estimator::{Estimator, Rest};
+use super::estimator::{LightEstimator, RemainingLight};
 use super::shade::Path;
 use super::sharing::Sharing;
 use super::vertex::PathVertex;
@@ -12,14 +12,14 @@ use crate::transport::settings::Counters;
 use crate::transport::walk::dimension;
 use crate::transport::walk::termination::{continuation_probability, is_cut};
 
-impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
+impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Next ray of the path from `vertex`, if the path survives, to find the `rest` of the light.
     #[inline]
     pub(super) fn scatter(
         &self,
         Path { path, state, shared }: Path<E::State, R::State>,
         vertex: &PathVertex,
-        rest: &Rest,
+        rest: &RemainingLight,
         counters: &mut Counters,
     ) -> Option<Ray> {
         let PathVertex { point, ref bsdf, ref sampler, wo, first, segments, apart, .. } = *vertex;

@@ -2,7 +2,7 @@
 //! light of the estimator, next-event estimation (`direct.rs`), next direction (`scatter.rs`).
 
 use super::PathIntegrator;
-use super::estimator::{EmissionHit, Estimator, KnownLight, Rest};
+use super::estimator::{EmissionHit, KnownLight, LightEstimator, RemainingLight};
 use super::sharing::PathMemory;
 use super::sharing::Sharing;
 use super::vertex::PathVertex;
@@ -21,7 +21,7 @@ use core::ops::Range;
 use glam::Vec3;
 
 /// Path tracer and the memory of a wave beside the wavefront.
-pub(super) struct Shading<'i, 'a, 'm, F: Features, E: Estimator<F>, R: Sharing> {
+pub(super) struct Shading<'i, 'a, 'm, F: Features, E: LightEstimator<F>, R: Sharing> {
     pub(super) integrator: &'i PathIntegrator<'a, F, E, R>,
     pub(super) memory: &'i mut PathMemory<'m, E::State, R>,
 }
@@ -33,7 +33,7 @@ pub(super) struct Path<'p, S, T> {
     pub(super) shared: &'p mut T,
 }
 
-impl<F: Features, E: Estimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, E, R> {
+impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, E, R> {
     fn shadow_rays(&self) -> usize {
         let PathIntegrator { context, estimator, .. } = self.integrator;
         (estimator.light_samples(context) + estimator.connections()) as usize
@@ -106,7 +106,7 @@ impl<S, R: Sharing> PathMemory<'_, S, R> {
     }
 }
 
-impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// Adds the emission at the hit of `ray` and prepares the scattering vertex. `Err` if there is none:
     /// `Some` next ray behind a skipped surface, or `None` if the path ends.
     #[inline]
@@ -226,7 +226,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         Path { path, state, shared }: Path<E::State, R::State>,
         vertex: &PathVertex,
         found: E::Found,
-    ) -> Rest {
+    ) -> RemainingLight {
         let mut add = |KnownLight { contribution, blur }: KnownLight| {
             // Not shared: other paths look up the data structure at their own vertices.
             R::add_own(shared, path, contribution);

@@ -6,7 +6,7 @@
 //! The set of these pixels depends only on the camera and the corners of the lamps, so that there is no bias.
 
 use super::PathIntegrator;
-use super::estimator::Estimator;
+use super::estimator::LightEstimator;
 use super::sharing::Sharing;
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -196,7 +196,7 @@ pub(in crate::transport) fn emission<F: Features>(
     Rgb::ZERO
 }
 
-impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
+impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Sets `wave.shadow_light` of the first `count` paths to the emission of lamps in their pixels, or to
     /// zero if the place of the pixel is not `on_silhouette`.
     pub(super) fn trace_silhouettes(

@@ -4,7 +4,7 @@
 //! otherwise pixels follow the Z-curve, so that neighbours look up a cache together.
 
 use super::PathIntegrator;
-use super::estimator::Estimator;
+use super::estimator::LightEstimator;
 use super::sharing::PathWave;
 use super::sharing::Sharing;
 use super::silhouette::silhouette_pixels;
@@ -15,7 +15,7 @@ use crate::geometry::Ray;
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::transport::settings::{Counters, PathSettings};
-use crate::transport::walk::component::Components;
+use crate::transport::walk::path_classes::PathClasses;
 use crate::transport::wavefront::PathState;
 use core::ops::Range;
 
@@ -47,7 +47,7 @@ impl TileSampler {
     }
 }
 
-impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
+impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Traces `samples` of tile `task` and adds them to `out`, the tile's pixels of the film.
     ///
     /// # Errors
@@ -156,7 +156,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         let PathSettings { width, seed, .. } = self.settings;
         let pixel = y * width + x;
         let ray = self.camera_ray([x, y], &Sampler::new(seed, pixel, sample));
-        let components = if is_on_silhouette { Components::WITHOUT_EMISSION } else { Components::ALL };
+        let components = if is_on_silhouette { PathClasses::WITHOUT_EMISSION } else { PathClasses::ALL };
         wave.wave.rays[index] = Ray { tag: index as u32, ..ray };
         wave.wave.paths[index] = PathState::new(pixel, place, sample, components);
         wave.begin(index, circle);

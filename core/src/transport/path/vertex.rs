@@ -4,7 +4,7 @@ use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
-use crate::transport::walk::component::Components;
+use crate::transport::walk::path_classes::PathClasses;
 use glam::Vec3;
 
 /// Surface point of a path, its BSDF, and the quantities of the path so far.
@@ -33,7 +33,7 @@ pub struct PathVertex<'v, 'a> {
     /// True if an estimator supplies light of the base only, so that the narrow coat is sampled separately.
     pub(in crate::transport) apart: bool,
     /// Classes of light that the path had to find on its last segment.
-    pub(in crate::transport) came: Components,
+    pub(in crate::transport) came: PathClasses,
     /// Classes to find from here without an estimator.
-    pub(in crate::transport) rest: Components,
+    pub(in crate::transport) rest: PathClasses,
 }

@@ -9,13 +9,13 @@ use crate::photon::{
 };
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
+use crate::transport::path::estimator::{KnownLight, LightEstimator, RemainingLight};
 use crate::transport::path::vertex::PathVertex;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::PathSettings;
-use crate::transport::walk::component::Components;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
+use crate::transport::walk::path_classes::PathClasses;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
@@ -107,7 +107,7 @@ impl<'a> PhotonLight<'a> {
     }
 }
 
-impl<F: Features> Estimator<F> for PhotonLight<'_> {
+impl<F: Features> LightEstimator<F> for PhotonLight<'_> {
     type State = ();
     type Found = ();
     const SEPARATES_COATS: bool = true;
@@ -122,8 +122,8 @@ impl<F: Features> Estimator<F> for PhotonLight<'_> {
         _: &mut (),
         _: (),
         add: &mut impl FnMut(KnownLight),
-    ) -> Rest {
-        let mut rest = Rest::all(vertex);
+    ) -> RemainingLight {
+        let mut rest = RemainingLight::all(vertex);
         if vertex.segments > 1 && settings.is_limited() {
             return rest;
         }
@@ -132,7 +132,7 @@ impl<F: Features> Estimator<F> for PhotonLight<'_> {
         let reflected = self.reflected(context, (vertex.point, &vertex.bsdf), from, rotation);
         add(reflected.unwrap_or_default().known(vertex));
         if reflected.is_some() {
-            rest.wide = Some(Components::EMITTED);
+            rest.wide = Some(PathClasses::EMITTED);
         }
         rest
     }

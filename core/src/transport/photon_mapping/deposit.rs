@@ -5,8 +5,9 @@
 //!
 //! Departures from the plain algorithm:
 //! 1. After a photon is stored, the continuation probability is at most [`MAX_CONTINUATION`]. A path then
-//!    stores at most five photons on average in any scene, so that [`ROOM`] for a task is enough: an overflow
-//!    is 14 standard deviations above the mean, more survivals than any sequence of random numbers contains.
+//!    stores at most five photons on average in any scene, so that [`VERTICES_PER_TASK`] for a task is
+//!    enough: an overflow is 14 standard deviations above the mean, more survivals than any sequence of
+//!    random numbers contains.
 //! 2. The price: on surfaces of higher albedo, photons differ in power.
 
 use crate::bsdf::Features;
@@ -21,7 +22,7 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::light::{
     Continuation, LightPathState, LightWalk, MAX_CONTINUATION, PhotonBuffer, Vertex, Visitor,
 };
-pub use crate::transport::walk::light::{PATHS, ROOM};
+pub use crate::transport::walk::light::{PATHS_PER_TASK, VERTICES_PER_TASK};
 use crate::{Level, Rgb};
 
 /// Selection of the photons to store.
@@ -52,7 +53,10 @@ impl PhotonFilter {
     pub(in crate::transport) fn continuation(self, vertex: &Vertex, stores: bool) -> Option<Continuation> {
         let ends = self == PhotonFilter::Caustic
             && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
-        (!ends).then_some(Continuation { most: if stores { MAX_CONTINUATION } else { 1.0 }, mirrored: false })
+        (!ends).then_some(Continuation {
+            most: if stores { MAX_CONTINUATION } else { 1.0 },
+            specular_only: false,
+        })
     }
 }
 
@@ -69,7 +73,7 @@ pub struct PhotonTracerSettings {
     pub max_depth: u32,
 }
 
-/// Photon tracer of one scene: a pass of tasks of [`PATHS`] paths.
+/// Photon tracer of one scene: a pass of tasks of [`PATHS_PER_TASK`] paths.
 #[derive(Clone, Copy)]
 pub struct PhotonTracer<'a, F> {
     pub(in crate::transport) flight: LightWalk<'a, F>,
@@ -111,7 +115,7 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
 
     /// Photon capacity that a task needs.
     pub fn room(&self) -> usize {
-        if self.keep == PhotonFilter::Caustic { PATHS } else { ROOM }
+        if self.keep == PhotonFilter::Caustic { PATHS_PER_TASK } else { VERTICES_PER_TASK }
     }
 
     /// Traces the photons of task `task` of map `map` (below 2³¹). Fills the rest of `out` with photons
@@ -178,7 +182,11 @@ impl Visitor for VisibilityCounter<'_> {
         let stores = self.keep.stores(state, vertex);
         if stores && self.sight.contains(vertex.point.position, vertex.point.geometric_normal) {
             let power = luminance(Rgb::from(state.power));
-            (self.seen)(VisiblePhoton { path: state.number as usize % PATHS, cell: state.cell, power });
+            (self.seen)(VisiblePhoton {
+                path: state.number as usize % PATHS_PER_TASK,
+                cell: state.cell,
+                power,
+            });
         }
         self.keep.continuation(vertex, stores)
     }

@@ -21,15 +21,15 @@ use crate::memory::{Arena, Line};
 use crate::photon::{FLATNESS, Kernel, MIN_NORMAL_COSINE, Neighbours, Photon, PhotonMap, QueryDisc};
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
+use crate::transport::path::estimator::{KnownLight, LightEstimator, RemainingLight};
 use crate::transport::path::vertex::PathVertex;
 use crate::transport::photon_mapping::density::{Light, PhotonLight, RadianceEstimate, reflected};
 use crate::transport::photon_mapping::irradiance::TEST_HEIGHT;
 pub use crate::transport::photon_mapping::irradiance::{IRRADIANCES, PrecomputedIrradiance, STRIDE};
 use crate::transport::settings::PathSettings;
-use crate::transport::walk::component::Components;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
+use crate::transport::walk::path_classes::PathClasses;
 use crate::{Level, Rgb};
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
@@ -174,15 +174,19 @@ impl PhotonMaps<'_> {
         &self,
         (context, settings): (&SceneContext<F>, &PathSettings),
         vertex: &PathVertex,
-    ) -> (RadianceEstimate, Rest) {
+    ) -> (RadianceEstimate, RemainingLight) {
         let PathVertex { point, ref bsdf, wo, came, segments, distance, travelled, .. } = *vertex;
         let is_limited = settings.is_limited();
         let rotation = vertex.sampler.single(dimension::PROBES + segments);
         // A path that may end in the map still may after this vertex.
-        let all = Rest::of(if came.may_end_in_photon_map() { Components::GATHERED } else { Components::ALL });
+        let all = RemainingLight::of(if came.may_end_in_photon_map() {
+            PathClasses::GATHERED
+        } else {
+            PathClasses::ALL
+        });
         if !bsdf.gathers_photons(context.separates_coats()) {
             if came.excludes_caustics() && bsdf.is_caustic_caster() {
-                let rest = Rest { is_lit: true, ..Rest::of(Components::BEHIND_MIRROR) };
+                let rest = RemainingLight { is_lit: true, ..RemainingLight::of(PathClasses::BEHIND_MIRROR) };
                 return (RadianceEstimate::default(), rest);
             }
             return (RadianceEstimate::default(), all);
@@ -191,26 +195,28 @@ impl PhotonMaps<'_> {
             && (!is_limited || segments == 2)
             && let Some(light) = self.global.reflected(context, (point, bsdf), wo, distance, rotation)
         {
-            let rest = Rest { wide: None, is_lit: true, ..all };
+            let rest = RemainingLight { wide: None, is_lit: true, ..all };
             return (RadianceEstimate { light, ..RadianceEstimate::default() }, rest);
         }
         if is_limited && segments > 1 {
-            return (RadianceEstimate::default(), Rest::of(Components::ALL));
+            return (RadianceEstimate::default(), RemainingLight::of(PathClasses::ALL));
         }
         match &self.caustic {
             Some(caustic) => {
                 let travelled = if came.may_end_in_photon_map() { 0.0 } else { travelled };
                 let gathered = caustic.reflected(context, (point, bsdf), (wo, travelled), rotation);
-                let rest = Rest { wide: Some(Components::NO_CAUSTIC), ..all };
+                let rest = RemainingLight { wide: Some(PathClasses::NO_CAUSTIC), ..all };
                 (gathered.unwrap_or_default(), rest)
             }
-            None => (RadianceEstimate::default(), Rest { wide: Some(Components::GATHERED), ..all }),
+            None => {
+                (RadianceEstimate::default(), RemainingLight { wide: Some(PathClasses::GATHERED), ..all })
+            }
         }
     }
 }
 
 /// Photon maps of even and of odd samples.
-impl<F: Features> Estimator<F> for &[PhotonMaps<'_>; 2] {
+impl<F: Features> LightEstimator<F> for &[PhotonMaps<'_>; 2] {
     type State = ();
     type Found = ();
     const SEPARATES_COATS: bool = true;
@@ -223,7 +229,7 @@ impl<F: Features> Estimator<F> for &[PhotonMaps<'_>; 2] {
         _: &mut (),
         _: (),
         add: &mut impl FnMut(KnownLight),
-    ) -> Rest {
+    ) -> RemainingLight {
         let (gathered, rest) = self[vertex.sample as usize & 1].at(scene, vertex);
         add(gathered.known(vertex));
         rest

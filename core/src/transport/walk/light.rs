@@ -13,6 +13,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::sampling::{Numbers, Sampler, mix};
 use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::mis::Sums;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
@@ -21,11 +22,11 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Number of light paths of a task.
-pub const PATHS: usize = 1024;
+pub const PATHS_PER_TASK: usize = 1024;
 
 /// Capacity of a task in vertices. With a continuation probability of at most [`MAX_CONTINUATION`] the mean
 /// is at most five vertices per path.
-pub const ROOM: usize = 6 * PATHS;
+pub const VERTICES_PER_TASK: usize = 6 * PATHS_PER_TASK;
 
 /// Maximum continuation probability of a path that stores its vertices.
 pub(in crate::transport) const MAX_CONTINUATION: f32 = 0.8;
@@ -57,17 +58,15 @@ pub(in crate::transport) struct LightPathState {
     pub cell: u32,
     /// Last vertex, for visitors that store it.
     pub position: [f32; 3],
-    /// Running MIS quantities of a bidirectional path (`bidirectional/mis.rs`).
-    pub last: f32,
-    pub rest: f32,
-    pub merge: f32,
-    /// R / (π² r² N) so far, for visitors that weight photons (`merge.rs`, `caustics.rs`).
-    pub chain: f32,
+    /// Running MIS sums of a bidirectional path.
+    pub sums: Sums,
+    /// R / (π² r² N) so far, for visitors that weight photons (`caustics/merge.rs`, `caustics/tracer.rs`).
+    pub chain_ratio: f32,
     /// Root of the sum of squared pdfs of the techniques of path tracing, over the pdf of the technique of
-    /// `chain`: 1 if that is the only technique, 0 if there is none.
-    pub others: f32,
-    /// 1 if the last surface is purely specular; for bidirectional paths, also if it scatters narrowly.
-    pub mirrored: u32,
+    /// `chain_ratio`: 1 if that is the only technique, 0 if there is none.
+    pub path_pdfs: f32,
+    /// 1 if the last surface is a caster: purely specular; for bidirectional paths, also narrow gloss.
+    pub from_caster: u32,
     /// Product of the continuation probabilities so far.
     survived: f32,
 }
@@ -112,7 +111,7 @@ pub(in crate::transport) struct Continuation {
     /// Upper bound of the continuation probability.
     pub most: f32,
     /// True if the path survives only if it scatters by a delta function or by a coat alone.
-    pub mirrored: bool,
+    pub specular_only: bool,
 }
 
 /// Action of a method at the vertices of light subpaths.
@@ -137,7 +136,7 @@ pub(in crate::transport) trait Visitor {
     }
 
     /// Called before the path leaves the vertex by `sample`, from the local direction `from`. The flag
-    /// `is_narrow` marks a delta function or a coat alone.
+    /// `is_specular` marks a delta function or a coat alone.
     #[inline]
     fn leave(
         &self,
@@ -163,12 +162,15 @@ pub(in crate::transport) struct LightWalk<'a, F> {
 impl<F: Features> LightWalk<'_, F> {
     /// Number of tasks of a map.
     pub(in crate::transport) fn tasks(&self) -> usize {
-        (self.paths as usize).div_ceil(PATHS)
+        (self.paths as usize).div_ceil(PATHS_PER_TASK)
     }
 
     /// Scratch memory of one task.
     pub(in crate::transport) fn scratch() -> Footprint {
-        Footprint::default().slice::<LightPathState>(PATHS).slice::<Ray>(PATHS).slice::<Hit>(PATHS)
+        Footprint::default()
+            .slice::<LightPathState>(PATHS_PER_TASK)
+            .slice::<Ray>(PATHS_PER_TASK)
+            .slice::<Hit>(PATHS_PER_TASK)
     }
 
     /// Follows the paths of task `task` of map `map`.
@@ -179,15 +181,15 @@ impl<F: Features> LightWalk<'_, F> {
         scratch: &mut Arena,
         visitor: &mut V,
     ) -> Result<Counters, OutOfMemory> {
-        let first = task * PATHS;
-        let paths = (self.paths as usize).saturating_sub(first).min(PATHS);
+        let first = task * PATHS_PER_TASK;
+        let paths = (self.paths as usize).saturating_sub(first).min(PATHS_PER_TASK);
         // Each path has one point of the sequence; even and odd maps are independent.
         let seed = mix(V::SEED ^ u64::from(self.seed)) as u32;
         let numbers_of = |number| Sampler::replicate(seed, map >> 1, map & 1, number);
         let mut arena = scratch.scratch();
-        let states = arena.slice::<LightPathState>(PATHS)?;
-        let rays = arena.slice::<Ray>(PATHS)?;
-        let hits = arena.slice::<Hit>(PATHS)?;
+        let states = arena.slice::<LightPathState>(PATHS_PER_TASK)?;
+        let rays = arena.slice::<Ray>(PATHS_PER_TASK)?;
+        let hits = arena.slice::<Hit>(PATHS_PER_TASK)?;
         let mut counters = Counters::default();
         let mut active = 0;
         for (i, state) in states.iter_mut().enumerate().take(paths) {
@@ -269,12 +271,13 @@ impl<F: Features> LightWalk<'_, F> {
             true => bsdf.sample_apart::<F>(from, [u, v, lobe]),
             false => bsdf.sample::<F>(from, [u, v, lobe]).map(|sample| (sample, sample.delta)),
         };
-        let (sample, is_narrow) = sample.filter(|(_, is_narrow)| *is_narrow || !onward.mirrored)?;
+        let (sample, is_specular) =
+            sample.filter(|(_, is_specular)| *is_specular || !onward.specular_only)?;
         let towards = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, towards) {
             return None;
         }
-        visitor.leave(state, &vertex, from, (&sample, is_narrow));
+        visitor.leave(state, &vertex, from, (&sample, is_specular));
         // Unlike radiance, power is not scaled by refraction; with a shading normal, the other cosine counts
         // (Veach 1997, sections 5.2 and 5.3).
         let power = Rgb::from(state.power);

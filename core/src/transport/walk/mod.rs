@@ -1,10 +1,10 @@
 //! Subpaths from surface to surface: the scene as they see it, light subpaths, visibility along shadow rays,
 //! classes of light, weights, random numbers and termination.
 
-pub(in crate::transport) mod component;
 pub(in crate::transport) mod context;
 pub(in crate::transport) mod dimension;
 pub(in crate::transport) mod light;
 pub(in crate::transport) mod mis;
+pub(in crate::transport) mod path_classes;
 pub(in crate::transport) mod termination;
 pub(in crate::transport) mod visibility;

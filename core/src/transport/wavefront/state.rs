@@ -5,7 +5,7 @@ use crate::film::CIRCLE;
 use crate::geometry::{Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::settings::Counters;
-use crate::transport::walk::component::Components;
+use crate::transport::walk::path_classes::PathClasses;
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use bytemuck::{Pod, Zeroable};
 
@@ -40,7 +40,7 @@ pub struct PathState {
     /// Product of the squared relative indices of refraction so far.
     pub(in crate::transport) eta_squared: f32,
     /// Classes of light that the path has to find behind its ray.
-    pub(in crate::transport) components: Components,
+    pub(in crate::transport) components: PathClasses,
     /// Length of the path from the camera to its last vertex.
     pub(in crate::transport) travelled: f32,
 }
@@ -48,7 +48,7 @@ pub struct PathState {
 impl PathState {
     /// Path before its first segment: sample `sample` of pixel `pixel` of the picture, at `place` in its
     /// tile.
-    pub(in crate::transport) fn new(pixel: u32, place: u32, sample: u32, components: Components) -> Self {
+    pub(in crate::transport) fn new(pixel: u32, place: u32, sample: u32, components: PathClasses) -> Self {
         Self {
             throughput: [1.0; 3],
             pdf: f32::INFINITY,

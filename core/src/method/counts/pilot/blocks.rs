@@ -7,7 +7,7 @@ use crate::film::PIXELS_PER_TILE;
 use crate::method::counts::prediction::{CANDIDATES, Reweighted, Weighed, Work};
 use crate::transport::Counters;
 use crate::transport::bidirectional::contribution::{Class, Contribution};
-use crate::transport::bidirectional::light_pass::PATHS;
+use crate::transport::bidirectional::light_pass::PATHS_PER_TASK;
 
 impl<F: Features> Pilot<'_, '_, F> {
     /// Adds camera paths of a sample to the `blocks` and sums of their tile. The variance is that of pairs
@@ -87,7 +87,7 @@ impl<F: Features> Pilot<'_, '_, F> {
         }
         let samples = pixels / PART;
         let connections = of(&|block| block.connections);
-        let light_paths = (self.tasks * PATHS) as f32 / PART;
+        let light_paths = (self.tasks * PATHS_PER_TASK) as f32 / PART;
         let work = Work {
             camera_rays: camera.rays as f32 / samples,
             light_samples: (camera.shadow_rays as f32 - connections).max(0.0) / samples,

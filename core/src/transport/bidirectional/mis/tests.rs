@@ -1,5 +1,5 @@
-//! The running sums against all densities written down: random paths over all kinds of lights, rough and
-//! narrow vertices, mirrors and refraction.
+//! The running sums against all densities written down: random paths over all kinds of lights, rough
+//! vertices and casters, mirrors and refraction.
 
 use super::*;
 use crate::sampling::Random;
@@ -22,10 +22,10 @@ enum Light {
 #[derive(Clone, Copy, Default)]
 struct Vertex {
     is_delta: bool,
-    /// Neither delta nor narrow.
+    /// Neither delta nor a caster.
     is_rough: bool,
     /// η, if paths are merged here.
-    merge: f64,
+    eta_vcm: f64,
     /// Cosines to the vertex before, as the light walk sees it, and to that behind.
     cos: [f64; 2],
     /// Density of the light walk on to the vertex behind, and of the camera walk on to the vertex before.
@@ -87,8 +87,8 @@ fn random_path(random: &Random, counter: &mut u32) -> Path {
             let pdf = [spread * within(0.05, 1.0), spread * within(0.05, 1.0)];
             let is_rough = !is_delta && within(0.0, 1.0) < 0.6;
             // Some rough surfaces hold no photons.
-            let merge = if within(0.0, 1.0) < 0.8 { within(0.01, 10.0) } else { 0.0 };
-            Vertex { is_delta, is_rough, merge, cos, pdf, eta }
+            let eta_vcm = if within(0.0, 1.0) < 0.8 { within(0.01, 10.0) } else { 0.0 };
+            Vertex { is_delta, is_rough, eta_vcm, cos, pdf, eta }
         })
         .collect();
     Path {
@@ -127,7 +127,7 @@ impl Path {
             Arrival::of(
                 !self.vertices[i - 2].is_rough,
                 self.squared[i - 1] as f32,
-                self.vertices[i - 1].merge as f32,
+                self.vertices[i - 1].eta_vcm as f32,
             )
         };
         if i > 1 { of(i) } else { None }
@@ -142,7 +142,7 @@ impl Path {
     /// The vertex that the path is merged at: the first rough one from the camera, if light comes so to it.
     fn merged(&self) -> Option<usize> {
         let first = (1..=self.vertices.len()).rev().find(|&i| self.vertices[i - 1].is_rough)?;
-        (self.is_caustic(first) && self.vertices[first - 1].merge > 0.0).then_some(first)
+        (self.is_caustic(first) && self.vertices[first - 1].eta_vcm > 0.0).then_some(first)
     }
 
     /// Counts times densities of all techniques, as products over the vertices that are not delta; that of
@@ -209,7 +209,7 @@ impl Path {
         }
         let merge = self.merged().filter(|_| merges).map_or(0.0, |vertex| {
             let at = solid.iter().position(|&i| i == vertex).unwrap();
-            self.vertices[vertex - 1].merge * by_light(at) * by_camera(at)
+            self.vertices[vertex - 1].eta_vcm * by_light(at) * by_camera(at)
         });
         let sum: f64 = all.iter().sum::<f64>() + merge;
         // By the segment that each technique connects: 0 is the hit, s the segment after x_{s-1}.

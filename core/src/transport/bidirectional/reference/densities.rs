@@ -139,7 +139,7 @@ struct At {
     pdf: [f64; 2],
     is_delta: bool,
     eta: f64,
-    is_narrow: bool,
+    is_caster: bool,
     /// η.
     merges: f64,
     arrival: Option<Arrival>,
@@ -155,8 +155,8 @@ impl Reference<'_> {
         if weight.is_finite() { weight as f32 } else { 0.0 }
     }
 
-    /// Vertex x_i, whose light comes from x_{i-1}, a vertex that `is_narrow`.
-    fn at(&self, path: &Path, i: usize, lens: Vec3, is_narrow: bool) -> Option<At> {
+    /// Vertex x_i, whose light comes from x_{i-1}, a caster if `from_caster`.
+    fn at(&self, path: &Path, i: usize, lens: Vec3, from_caster: bool) -> Option<At> {
         let vertex = &path.vertices[i - 1];
         let (to_light, squared) = path.towards(i, i - 1);
         let to_camera = match i == path.count {
@@ -171,7 +171,7 @@ impl Reference<'_> {
         };
         let cos = |way: [f64; 3]| dot(way, wide(by_camera.0.geometric_normal)).abs();
         let (merges, arrival) = match i > 1 {
-            true => self.merge((&by_camera.0, &by_camera.1), squared, is_narrow),
+            true => self.merge((&by_camera.0, &by_camera.1), squared, from_caster),
             false => (0.0, None),
         };
         Some(At {
@@ -179,7 +179,7 @@ impl Reference<'_> {
             pdf: [density(by_light, to_light, to_camera), density(by_camera, to_camera, to_light)],
             is_delta: vertex.is_delta,
             eta: vertex.eta,
-            is_narrow: vertex.is_delta || by_camera.1.is_caustic_caster(),
+            is_caster: vertex.is_delta || by_camera.1.is_caustic_caster(),
             merges,
             arrival,
             is_bent: is_bent(&by_light.0, by_light.0.frame.to_local(narrow(to_light))),
@@ -201,7 +201,7 @@ impl Reference<'_> {
         let lens = last - seen.distance * seen.direction;
         let mut at = [At::default(); MOST_SEGMENTS + 1];
         for i in 1..k {
-            at[i] = self.at(path, i, lens, i > 1 && at[i - 1].is_narrow)?;
+            at[i] = self.at(path, i, lens, i > 1 && at[i - 1].is_caster)?;
         }
         let [emission, light_sample, cos_light] = self.of_light(path)?;
         let pixel = f64::from(seen.pdf) * f64::from(size[0]) * f64::from(size[1]);
@@ -249,7 +249,7 @@ impl Reference<'_> {
                 _ => f64::from(counts.connections) * by_light(i) * by_camera(i + 1),
             };
         }
-        let first_rough = (1..k).rev().find(|&i| !at[i].is_narrow);
+        let first_rough = (1..k).rev().find(|&i| !at[i].is_caster);
         if let Some(i) = first_rough
             && at[i].arrival.is_some_and(|arrival| arrival.is_merged((k - i) as u32))
         {

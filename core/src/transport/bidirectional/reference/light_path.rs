@@ -91,7 +91,7 @@ impl Visitor for Recorder<'_, '_> {
             };
         } else {
             let left = path.vertices.get_mut(count - 2)?;
-            (left.is_delta, left.eta) = (state.mirrored == 1, f64::from(state.chain));
+            (left.is_delta, left.eta) = (state.from_caster == 1, f64::from(state.chain_ratio));
         }
         let [u, v] = vertex.barycentric;
         let slot = path.vertices.get_mut(count - 1)?;
@@ -106,6 +106,6 @@ impl Visitor for Recorder<'_, '_> {
     }
 
     fn leave(&self, state: &mut LightPathState, _: &Vertex, _: Vec3, (sample, _): (&BsdfSample, bool)) {
-        (state.mirrored, state.chain) = (u32::from(sample.delta), sample.eta);
+        (state.from_caster, state.chain_ratio) = (u32::from(sample.delta), sample.eta);
     }
 }

@@ -20,7 +20,7 @@ struct CameraSums {
 impl Path {
     /// The count of merges at vertex `i`.
     fn count(&self, i: usize, merges: bool) -> f32 {
-        if merges { self.vertices[i - 1].merge as f32 } else { 0.0 }
+        if merges { self.vertices[i - 1].eta_vcm as f32 } else { 0.0 }
     }
 
     /// The sums after a delta vertex with cosines `cos` to both sides.
@@ -51,11 +51,11 @@ impl Path {
                 _ => sums.arrive(f(self.squared[i - 1]), f(vertex.cos[0]), vertex.is_delta),
             };
             let has_merges = merges && self.arrival(i).is_some();
-            let merge = vertex.is_rough.then(|| self.count(i, has_merges));
-            *arrived = Sums { merge: merge.unwrap_or(sums.merge), ..sums };
+            let eta_vcm = vertex.is_rough.then(|| self.count(i, has_merges));
+            *arrived = Sums { pending_merge: eta_vcm.unwrap_or(sums.pending_merge), ..sums };
             sums = match vertex.is_delta {
                 true => Self::scatter_delta(sums, vertex.cos, vertex.eta, mistake),
-                false => sums.scatter(counts, f(vertex.pdf[0]), f(vertex.pdf[1]), f(vertex.cos[1]), merge),
+                false => sums.scatter(counts, f(vertex.pdf[0]), f(vertex.pdf[1]), f(vertex.cos[1]), eta_vcm),
             };
         }
         light
@@ -129,7 +129,7 @@ impl Path {
             let at_camera = if self.is_caustic(i + 1) { merge[i + 1] } else { 0.0 };
             let at_light = match has_rough[i] {
                 true => 0.0,
-                false => light[i].merge * if y.is_rough { 1.0 } else { f(y.pdf[1]) },
+                false => light[i].pending_merge * if y.is_rough { 1.0 } else { f(y.pdf[1]) },
             };
             let y = end(light[i], y.pdf[0], y.pdf[1], y.cos[1], at_light);
             let z = end(camera[i + 1], z.pdf[1], z.pdf[0], z.cos[0], at_camera);
@@ -139,9 +139,9 @@ impl Path {
         if !last.is_delta {
             let pdf_area = f(self.pixel * last.cos[1] / self.squared[k - 1]);
             let merge = match last.is_rough {
-                true if self.is_caustic(k - 1) => light[k - 1].merge,
+                true if self.is_caustic(k - 1) => light[k - 1].pending_merge,
                 true => 0.0,
-                false => light[k - 1].merge * f(last.pdf[1]),
+                false => light[k - 1].pending_merge * f(last.pdf[1]),
             };
             weights[k] = weight_of_splat(counts, &light[k - 1], pdf_area, f(last.pdf[1]), merge);
         }

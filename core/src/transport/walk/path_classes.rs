@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 /// Set of classes that a path still has to find behind its ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub(in crate::transport) struct Components(u32);
+pub(in crate::transport) struct PathClasses(u32);
 
 /// Emission of surfaces.
 const EMISSION: u32 = 1;
@@ -24,7 +24,7 @@ const GATHERED: u32 = 1 << 5;
 /// Flag, no class of light: specular surfaces keep the set.
 const BEHIND_SPECULAR: u32 = 1 << 6;
 
-impl Components {
+impl PathClasses {
     /// All light.
     pub(in crate::transport) const ALL: Self = Self(EMISSION | ENVIRONMENT | SPECULAR | ROUGH | CAUSTIC);
     /// Light of emitters, direct or by specular surfaces; the irradiance cache supplies the rest.
@@ -103,18 +103,18 @@ mod tests {
 
     #[test]
     fn what_a_structure_knows_and_what_the_path_finds_are_disjoint_and_complete() {
-        let light = |set: Components| set.0 & Components::ALL.0;
+        let light = |set: PathClasses| set.0 & PathClasses::ALL.0;
         // The cache supplies the light that gather rays find. Its path finds the rest, except where specular
         // surfaces reflect the cached light.
         let cached = ROUGH;
-        assert_eq!(light(Components::DIRECT) & cached, 0);
-        assert_eq!(light(Components::DIRECT) | cached, Components::ALL.0);
-        assert_eq!(light(Components::REFLECTED), cached);
+        assert_eq!(light(PathClasses::DIRECT) & cached, 0);
+        assert_eq!(light(PathClasses::DIRECT) | cached, PathClasses::ALL.0);
+        assert_eq!(light(PathClasses::REFLECTED), cached);
         // Photons supply all light except direct light of emitters.
-        assert_eq!(light(Components::EMITTED) | (SPECULAR | ROUGH | CAUSTIC), Components::ALL.0);
+        assert_eq!(light(PathClasses::EMITTED) | (SPECULAR | ROUGH | CAUSTIC), PathClasses::ALL.0);
         // A caustic map supplies caustics alone.
-        assert_eq!(light(Components::NO_CAUSTIC) | CAUSTIC, Components::ALL.0);
-        assert_eq!(light(Components::GATHERED), Components::ALL.0);
-        assert_eq!(Components::DIRECT.and(Components::ALL), Components::DIRECT);
+        assert_eq!(light(PathClasses::NO_CAUSTIC) | CAUSTIC, PathClasses::ALL.0);
+        assert_eq!(light(PathClasses::GATHERED), PathClasses::ALL.0);
+        assert_eq!(PathClasses::DIRECT.and(PathClasses::ALL), PathClasses::DIRECT);
     }
 }

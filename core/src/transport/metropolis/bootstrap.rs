@@ -65,14 +65,14 @@ impl Lengths {
 
 /// Draws the points of a sample of the picture.
 #[derive(Clone, Copy)]
-pub struct Look<'a, F> {
+pub struct Bootstrap<'a, F> {
     pub(super) target: Target<'a, F>,
     pub(super) lengths: Lengths,
     seed: u32,
     sample: u32,
 }
 
-impl<'a, F: Features> Look<'a, F> {
+impl<'a, F: Features> Bootstrap<'a, F> {
     /// Points for `sample` of the picture of `seed`.
     pub fn new(target: Target<'a, F>, lengths: Lengths, seed: u32, sample: u32) -> Self {
         let seed = mix(SEED ^ u64::from(seed)) as u32;
@@ -129,7 +129,7 @@ impl<'a, F: Features> Look<'a, F> {
     /// Writes the densities of the candidates of a task, each over the probability of its length.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`Look::scratch`].
+    /// [`OutOfMemory`] where `scratch` has less than [`Bootstrap::scratch`].
     pub fn run(
         &self,
         task: usize,
