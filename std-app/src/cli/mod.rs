@@ -18,6 +18,7 @@ mod render;
 mod stability;
 mod stdio;
 mod study;
+mod study_radiance;
 mod summary;
 mod values;
 

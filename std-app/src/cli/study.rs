@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::method_args::{MethodArg, MethodArgs};
 use super::picture_args::{PictureArgs, render_failure};
 use super::stdio::{print_note, print_result};
+use super::study_radiance::Radiance;
 use super::values;
 use clap::{Args, Subcommand};
 use halflight::load;
@@ -24,6 +25,7 @@ pub(super) struct Study {
 #[derive(Subcommand)]
 enum Subject {
     Irradiance(Box<Irradiance>),
+    Radiance(Radiance),
 }
 
 /// Error metrics of the irradiance cache at equal numbers of records
@@ -59,8 +61,10 @@ struct Irradiance {
 
 impl Study {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
-        let Subject::Irradiance(study) = &self.subject;
-        study.run()
+        match &self.subject {
+            Subject::Irradiance(study) => study.run(),
+            Subject::Radiance(study) => study.run(),
+        }
     }
 }
 

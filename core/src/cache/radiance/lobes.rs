@@ -1,16 +1,16 @@
 //! Coefficients of microfacet lobes for each direction of the viewer, and the degree that a tolerance needs.
 //!
-//! A GGX lobe depends on alpha and on the viewer's angle θ_o alone, and Schlick's reflectance is linear in the
-//! reflectance f0 at normal incidence: f = f0 W + (1 - f0) E, W with F = 1 and E with F = (1 - c)⁵. One table of
-//! both serves every metal and every coat with Schlick's reflectance, whatever its colour and texture. With the
-//! viewer in the plane of x and z a lobe is even in y, so that functions with a sine have no coefficient; a
-//! viewer at azimuth φ multiplies c_{d,m} by (cos mφ, sin mφ).
+//! A GGX lobe depends on alpha and on the viewer's angle θ_o alone, and Schlick's reflectance is linear in
+//! the reflectance f0 at normal incidence: f = f0 W + (1 - f0) E, W with F = 1 and E with F = (1 - c)⁵. One
+//! table of both serves every metal and every coat with Schlick's reflectance, whatever its colour and
+//! texture. With the viewer in the plane of x and z a lobe is even in y, so that functions with a sine have
+//! no coefficient; a viewer at azimuth φ multiplies c_{d,m} by (cos mφ, sin mφ).
 //!
-//! The radiance that leaves is Lo = Σ c_k λ_k. By Cauchy and Schwarz its error is at most the norm of the rest
-//! f - P_d f times the norm of the light beyond degree d. τ_d = √π ‖f - P_d f‖/∫ f cos dω is thus the relative
-//! error for light of standard deviation 1, as bad as can be. In rooms half of τ_d/(d + 2) is the error that
-//! remains in the median: the degree of a lobe is the lowest with that below the tolerance (Křivánek et al.
-//! 2005, with a maximum of the error in its place).
+//! The radiance that leaves is Lo = Σ c_k λ_k. By Cauchy and Schwarz its error is at most the norm of the
+//! rest f - P_d f times the norm of the light beyond degree d. τ_d = √π ‖f - P_d f‖/∫ f cos dω is thus the
+//! relative error for light of standard deviation 1, as bad as can be. In rooms half of τ_d/(d + 2) is the
+//! error that remains in the median: the degree of a lobe is the lowest with that below the tolerance
+//! (Křivánek et al. 2005, with a maximum of the error in its place).
 
 use super::zernike::{COUNT_MAX, DEGREE_MAX, index, values};
 use crate::bsdf::fresnel::schlick_weight;

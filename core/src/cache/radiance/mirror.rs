@@ -1,18 +1,18 @@
 //! Lookups at normals other than a record's, without a rotation of coefficients.
 //!
-//! A surface of normal n mirrors the viewer's direction ω_o to r = 2 (ω_o·n) n - ω_o. The lobe that surrounds r
-//! belongs, over the record's normal n_i, to a viewer at ω' = 2 (r·n_i) n_i - r. The radiance that leaves
-//! towards ω_o is that which the record has for ω', times the ratio of the albedos at both angles: exact if
-//! n = n_i, and exact for radiance 1. The lobe stays within the hemisphere that the record saw; light from below
-//! its horizon is missing, which costs 1 % at a tenth of a radian.
+//! A surface of normal n mirrors the viewer's direction ω_o to r = 2 (ω_o·n) n - ω_o. The lobe that surrounds
+//! r belongs, over the record's normal n_i, to a viewer at ω' = 2 (r·n_i) n_i - r. The radiance that leaves
+//! towards ω_o is that which the record has for ω', times the ratio of the albedos at both angles: exact if n
+//! = n_i, and exact for radiance 1. The lobe stays within the hemisphere that the record saw; light from
+//! below its horizon is missing, which costs 1 % at a tenth of a radian.
 
 use glam::Vec3;
 
 /// Minimum cosine of ω' at the record's normal.
 const COSINE_MIN: f32 = 0.05;
 
-/// Viewer ω' of the record's normal `recorded` for the viewer `wo` of `normal`, all unit and in one space. `None`
-/// if the record cannot serve this lobe.
+/// Viewer ω' of the record's normal `recorded` for the viewer `wo` of `normal`, all unit and in one space.
+/// `None` if the record cannot serve this lobe.
 ///
 /// ```
 /// use glam::Vec3;

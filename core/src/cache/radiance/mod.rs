@@ -1,8 +1,8 @@
 //! Radiance caching (Křivánek et al. 2005): incident radiance of a point in coefficients of a basis.
 //!
 //! [`zernike`] is the basis, [`StrataTables`] its means over the strata of gather rays, [`Coefficients`] the
-//! projection of a hemisphere, and [`derivatives`] its change with position. [`lobes`] has the coefficients of
-//! BSDFs, and [`mirrored_viewer`] serves normals other than that of the hemisphere.
+//! projection of a hemisphere, and [`derivatives`] its change with position. [`lobes`] has the coefficients
+//! of BSDFs, and [`mirrored_viewer`] serves normals other than that of the hemisphere.
 
 mod coefficients;
 pub mod derivatives;

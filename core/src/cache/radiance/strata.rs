@@ -1,11 +1,12 @@
 //! Tables of the basis for the strata of a hemisphere and for the borders between them.
 //!
-//! The strata of the concentric map have equal shares of the disk, so that a coefficient of N × N radiances is
+//! The strata of the concentric map have equal shares of the disk, so that a coefficient of N × N radiances
+//! is
 //!
 //!   λ_k = ∫ L Z_k cos θ dω ≈ π/N² Σ_c L_c Z̄_kc
 //!
-//! with Z̄_kc the mean of Z_k over stratum c. A mean has less noise than the value at the traced direction; its
-//! cost is that the highest degrees are damped: by 3 % at degree 6 and N = 64, by a tenth at N = 32.
+//! with Z̄_kc the mean of Z_k over stratum c. A mean has less noise than the value at the traced direction;
+//! its cost is that the highest degrees are damped: by 3 % at degree 6 and N = 64, by a tenth at N = 32.
 
 use super::zernike::{DEGREE_MAX, count, values_higher};
 use crate::cache::irradiance::SIDE_MAX;
@@ -55,8 +56,8 @@ impl<'m> StrataTables<'m> {
     /// Builds the tables.
     ///
     /// # Errors
-    /// [`OutOfMemory`] if the arena has less than the footprint, n is not in 1 ..= [`SIDE_MAX`], or the degree
-    /// exceeds [`DEGREE_MAX`].
+    /// [`OutOfMemory`] if the arena has less than the footprint, n is not in 1 ..= [`SIDE_MAX`], or the
+    /// degree exceeds [`DEGREE_MAX`].
     pub fn build(n: usize, degree: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         if !(1..=SIDE_MAX).contains(&n) || degree > DEGREE_MAX {
             return Err(OutOfMemory { needed: usize::MAX, available: arena.available() });

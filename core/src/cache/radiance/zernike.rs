@@ -5,8 +5,8 @@
 //!
 //!   Z_{d,±m} = √((2 - δ_{m0})(d + 1)/π) R_d^m(r) {cos mφ, sin mφ},   d - m even, 0 <= m <= d <= 8.
 //!
-//! With w = x + iy and V_d^m = R_d^m(r) e^{imφ} the recurrence of Honarvar Shakibaei and Paramesran (2013) has
-//! neither angles nor divisions, and the derivatives are values of lower degrees:
+//! With w = x + iy and V_d^m = R_d^m(r) e^{imφ} the recurrence of Honarvar Shakibaei and Paramesran (2013)
+//! has neither angles nor divisions, and the derivatives are values of lower degrees:
 //!
 //!   V_d^m = w V_{d-1}^{m-1} + w̄ V_{d-1}^{m+1} - V_{d-2}^m,
 //!   ∂V_d^m/∂w = ∂V_{d-2}^m/∂w + d V_{d-1}^{m-1},   ∂V_d^m/∂w̄ = ∂V_{d-2}^m/∂w̄ + d V_{d-1}^{m+1}.
@@ -74,8 +74,8 @@ fn neighbours(v: &Polynomials, d: usize, m: usize) -> [Complex; 2] {
     [lower, if m < d { v[d - 1][m + 1] } else { [0.0; 2] }]
 }
 
-/// Values of all functions up to `degree` at a point of the disk, for `degree` up to one above [`DEGREE_MAX`];
-/// zeros beyond.
+/// Values of all functions up to `degree` at a point of the disk, for `degree` up to one above
+/// [`DEGREE_MAX`]; zeros beyond.
 pub(super) fn values_higher(degree: usize, q: [f32; 2]) -> [f32; COUNT_HIGHER] {
     let degree = degree.min(DEGREE_MAX + 1);
     let v = polynomials(degree, q);

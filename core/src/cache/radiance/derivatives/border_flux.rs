@@ -1,8 +1,8 @@
 //! Derivatives of coefficients from the borders between strata.
 //!
 //! As in [`crate::cache::irradiance::CellFlux`], a border between strata of radiance L₁ and L₂ belongs to the
-//! nearer surface and moves with its inverse distance u. By Reynolds' transport theorem, with Z_k a polynomial
-//! in q = (x, y) and ν the normal of the border,
+//! nearer surface and moves with its inverse distance u. By Reynolds' transport theorem, with Z_k a
+//! polynomial in q = (x, y) and ν the normal of the border,
 //!
 //!   ∇λ_k = ∮ (L₁ - L₂) u Z_k (z ν ds),
 //!   Hess λ_k = ∮ (L₁ - L₂) u² Sym((z ν ds) ⊗ B_k),   B_k = 4 Z_k q - ∇Z_k + q (q·∇Z_k).
@@ -31,8 +31,8 @@ const GROUPS_HIGHER: usize = COUNT_HIGHER.div_ceil(16);
 /// Factors of a border: jump of each channel times u along x and y, and jump of the luminance times u².
 const FACTORS: usize = 8;
 
-/// First and second derivatives of all coefficients. `None` if the hemisphere has another number of strata than
-/// the tables.
+/// First and second derivatives of all coefficients. `None` if the hemisphere has another number of strata
+/// than the tables.
 pub fn border_flux(
     level: Level,
     tables: &StrataTables,

@@ -9,8 +9,8 @@ use crate::cache::irradiance::Hemisphere;
 use core::f32::consts::PI;
 use glam::Vec3;
 
-/// Gradients of all coefficients by central differences over `step` m to each side. `None` without normals, if
-/// `step` is not above 0, or if the hemisphere has another number of strata than the tables.
+/// Gradients of all coefficients by central differences over `step` m to each side. `None` without normals,
+/// if `step` is not above 0, or if the hemisphere has another number of strata than the tables.
 pub fn displaced(tables: &StrataTables, hemisphere: &Hemisphere, step: f32) -> Option<Gradients> {
     let (normals, n, degree) = (hemisphere.normals()?, hemisphere.n(), tables.degree());
     if n != tables.n() || step.is_nan() || step <= 0.0 {

@@ -1,5 +1,5 @@
-//! Gradients of coefficients without occlusion, by differentiation of the basis and of the solid angle of each
-//! sample (Křivánek et al. 2005). For comparison; they need the normals of the hits.
+//! Gradients of coefficients without occlusion, by differentiation of the basis and of the solid angle of
+//! each sample (Křivánek et al. 2005). For comparison; they need the normals of the hits.
 //!
 //! Each sample is a small surface patch of normal m that stays visible. With K_k = cos Z_k and the patch at
 //! inverse distance u in direction w,

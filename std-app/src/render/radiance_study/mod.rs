@@ -1,0 +1,36 @@
+//! Studies of radiance caching in rooms of known light: derivatives of coefficients against exact ones.
+
+mod gradients;
+mod polygons;
+
+pub use gradients::GradientError;
+
+use super::RenderError;
+use halflight_core::memory::{Arena, Line};
+
+/// Errors of derivatives in every room with each number of strata along a side; calls `tell` after each.
+pub fn study_gradients(strata: &[usize], tell: &mut dyn FnMut(&GradientError)) -> Result<(), RenderError> {
+    for room in &gradients::ROOMS {
+        for &strata in strata {
+            tell(&gradients::errors(room, strata)?);
+        }
+    }
+    Ok(())
+}
+
+/// Arena over whole lines.
+fn arena(lines: &mut [Line]) -> Arena<'_> {
+    Arena::new(bytemuck::cast_slice_mut(lines))
+}
+
+/// xorshift64*.
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
