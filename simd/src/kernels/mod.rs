@@ -1,5 +1,5 @@
-//! Batch kernels of ray traversal, of coefficients and derivatives of incident light, and of photon maps, each
-//! with a scalar reference.
+//! Batch kernels of ray traversal, of coefficients and derivatives of incident light, and of photon maps,
+//! each with a scalar reference.
 
 pub mod boxes;
 pub mod cells;

@@ -2,7 +2,8 @@
 //!
 //! [`zernike`] is the basis, [`StrataTables`] its means over the strata of gather rays, [`Coefficients`] the
 //! projection of a hemisphere, and [`derivatives`] its change with position. [`lobes`] has the coefficients
-//! of BSDFs, and [`mirrored_viewer`] serves normals other than that of the hemisphere.
+//! of BSDFs, and [`mirrored_viewer`] serves normals other than that of the hemisphere. [`sh`] are spherical
+//! harmonics, the basis of the paper, for comparison.
 
 mod coefficients;
 pub mod derivatives;
@@ -10,6 +11,7 @@ pub mod lobes;
 mod mirror;
 #[cfg(test)]
 mod rooms;
+pub mod sh;
 mod strata;
 pub mod zernike;
 
