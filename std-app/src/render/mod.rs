@@ -49,7 +49,7 @@ pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{CacheSettings, MapView, Method, PhotonSettings, PhotonView};
 pub use noise_and_blur::NoiseAndBlur;
-pub use radiance_study::{GradientError, study_gradients};
+pub use radiance_study::{ALPHAS, BasisError, GradientError, study_bases, study_gradients};
 pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
 pub use study::{IrradianceStudy, MetricError, study_irradiance};

@@ -221,13 +221,14 @@ pub(super) fn errors(room: &Room, strata: usize) -> Result<GradientError, OutOfM
         let Some(hemisphere) = gather.hemisphere() else { continue };
         let Some(flux) = border_flux(Level::detect(), &tables, &hemisphere) else { continue };
         for (group, degree) in [0, 2, 4, 6].into_iter().enumerate() {
-            for k in count(degree) - degree - 1..count(degree) {
-                for axis in 0..2 {
-                    gradient[group].add(f64::from(flux.gradients[0][k][axis]), truth[k][axis], 1.0);
-                }
-                let found = flux.hessians[k];
-                for (at, found, weight) in [(2, found.xx, 1.0), (3, found.xy, 2.0), (4, found.yy, 1.0)] {
-                    hessian[group].add(f64::from(found), truth[k][at], weight);
+            for (k, truth) in truth.iter().enumerate().take(count(degree)).skip(count(degree) - degree - 1) {
+                let ([x, y], found) = (flux.gradients[0][k], flux.hessians[k]);
+                gradient[group].add(f64::from(x), truth[0], 1.0);
+                gradient[group].add(f64::from(y), truth[1], 1.0);
+                for (found, truth, weight) in
+                    [(found.xx, truth[2], 1.0), (found.xy, truth[3], 2.0), (found.yy, truth[4], 1.0)]
+                {
+                    hessian[group].add(f64::from(found), truth, weight);
                 }
             }
         }

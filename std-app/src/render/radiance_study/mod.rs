@@ -1,12 +1,21 @@
-//! Studies of radiance caching in rooms of known light: derivatives of coefficients against exact ones.
+//! Studies of radiance caching in rooms of known light: bases of incident radiance by the error of reflected
+//! light, and derivatives of coefficients against exact ones.
 
+mod bases;
 mod gradients;
 mod polygons;
+mod rooms;
 
+pub use bases::{ALPHAS, BasisError};
 pub use gradients::GradientError;
 
 use super::RenderError;
 use halflight_core::memory::{Arena, Line};
+
+/// Errors of bases of incident radiance, by the number of coefficients.
+pub fn study_bases() -> Result<Vec<BasisError>, RenderError> {
+    Ok(bases::errors()?)
+}
 
 /// Errors of derivatives in every room with each number of strata along a side; calls `tell` after each.
 pub fn study_gradients(strata: &[usize], tell: &mut dyn FnMut(&GradientError)) -> Result<(), RenderError> {
