@@ -52,16 +52,13 @@ pub use noise_and_blur::NoiseAndBlur;
 pub use radiance_study::{ALPHAS, BasisError, GradientError, study_bases, study_gradients};
 pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
+pub use run::render;
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Mark, Survey, SurveyPixel};
 
 use crate::save::Image;
-use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
-use halflight_core::census::Census;
-use halflight_core::film::Tile;
 use halflight_core::findings::Findings;
-use halflight_core::scene::Scene;
 use halflight_core::transport::Counters;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -279,33 +276,3 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
 
 /// Most pixels of a picture.
 const MOST_PIXELS: u64 = 1 << 28;
-
-/// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. The calling thread calls
-/// `progress` after each round, outside the measured time.
-pub fn render(
-    scene: &Scene,
-    settings: &Settings,
-    progress: &mut dyn FnMut(&Progress),
-    interrupt: &AtomicBool,
-) -> Result<RenderResult, RenderError> {
-    let pixels = u64::from(settings.width) * u64::from(settings.height);
-    if !(1..=MOST_PIXELS).contains(&pixels) {
-        return Err(RenderError::Size);
-    }
-    let size = [settings.width, settings.height];
-    if settings.reference.as_ref().is_some_and(|reference| [reference.width, reference.height] != size) {
-        return Err(RenderError::Reference);
-    }
-    let Shard { index, count } = settings.shard;
-    let many = count as usize > Tile::count(settings.width, settings.height);
-    if index >= count || many {
-        return Err(RenderError::Shard);
-    }
-    let plan = Census::of(scene).plan();
-    let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
-    let method = settings.method.or(Method::named(plan.method)).unwrap_or(Method::Path);
-    if keeps_cache && method != Method::IrradianceCache {
-        return Err(RenderError::NoCache);
-    }
-    plan.features.dispatch(run::Render { scene, settings, method, progress, interrupt })
-}

@@ -1,4 +1,4 @@
-//! A render from its first structure to its last round.
+//! A render from its settings to its result: checks, structures, method, and the rounds of the picture.
 
 use super::audit::Audit;
 use super::deadline::Deadline;
@@ -9,29 +9,61 @@ use super::method::{self, Attempt, Method, Plan, RenderSetup};
 use super::picture::Picture;
 use super::workers::Workers;
 use super::{
-    Progress, RenderError, RenderResult, Seconds, Settings, cache_file, environment_visibility, gaps,
+    MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file, environment_visibility,
+    gaps,
 };
 use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
-use halflight_core::census::WithFeatures;
+use halflight_core::census::{Census, WithFeatures};
+use halflight_core::film::Tile;
 use halflight_core::findings::Findings;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
-use halflight_core::method::RenderState;
+use halflight_core::method::{RenderState, Shard};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, UNLIMITED};
 use std::time::Instant;
 
+/// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. The calling thread calls
+/// `progress` after each round, outside the measured time.
+pub fn render(
+    scene: &Scene,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&Progress),
+    interrupt: &AtomicBool,
+) -> Result<RenderResult, RenderError> {
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    if !(1..=MOST_PIXELS).contains(&pixels) {
+        return Err(RenderError::Size);
+    }
+    let size = [settings.width, settings.height];
+    if settings.reference.as_ref().is_some_and(|reference| [reference.width, reference.height] != size) {
+        return Err(RenderError::Reference);
+    }
+    let Shard { index, count } = settings.shard;
+    let many = count as usize > Tile::count(settings.width, settings.height);
+    if index >= count || many {
+        return Err(RenderError::Shard);
+    }
+    let plan = Census::of(scene).plan();
+    let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
+    let method = settings.method.or(Method::named(plan.method)).unwrap_or(Method::Path);
+    if keeps_cache && method != Method::IrradianceCache {
+        return Err(RenderError::NoCache);
+    }
+    plan.features.dispatch(Render { scene, settings, method, progress, interrupt })
+}
+
 /// A render, to be compiled for the features of its scene.
-pub(super) struct Render<'a> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) settings: &'a Settings,
-    pub(super) method: Method,
-    pub(super) progress: &'a mut dyn FnMut(&Progress),
-    pub(super) interrupt: &'a AtomicBool,
+struct Render<'a> {
+    scene: &'a Scene<'a>,
+    settings: &'a Settings,
+    method: Method,
+    progress: &'a mut dyn FnMut(&Progress),
+    interrupt: &'a AtomicBool,
 }
 
 impl WithFeatures for Render<'_> {

@@ -6,8 +6,7 @@ use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS, Points
 use crate::scene::SurfacePoint;
 use crate::transport::cached::overhang;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::estimator::{KnownLight, LightEstimator, RemainingLight};
-use crate::transport::path::vertex::PathVertex;
+use crate::transport::path::estimator::{KnownLight, LightEstimator, PathVertex, RemainingLight};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::path_classes::PathClasses;
@@ -70,7 +69,7 @@ impl CacheView<'_> {
 fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &PathSettings) -> Option<u32> {
     let path = wave.paths.get(wave.rays.get(ray)?.tag as usize)?;
     let asks = point.material.surface.may_be_diffuse()
-        && path.components.has_rough()
+        && path.classes.has_rough()
         && u32::from(path.segments) < settings.max_depth
         // Records do not store their distance from the camera.
         && (path.segments == 1 || !settings.is_limited());

@@ -48,9 +48,10 @@ use crate::light::{EmissionSampler, LightSample};
 use crate::photon::{Kernel, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::estimator::{EmissionHit, KnownLight, LightEstimator, RemainingLight};
+use crate::transport::path::estimator::{
+    EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight,
+};
 use crate::transport::path::sharing::Sharing;
-use crate::transport::path::vertex::PathVertex;
 use crate::transport::photon_mapping::density::{Light, RadianceEstimate, reflected};
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::PathSettings;

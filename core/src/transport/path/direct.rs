@@ -2,9 +2,8 @@
 //! (Veach 1997, chapter 9).
 
 use super::PathIntegrator;
-use super::estimator::{LightEstimator, RemainingLight};
+use super::estimator::{LightEstimator, PathVertex, RemainingLight};
 use super::sharing::Sharing;
-use super::vertex::PathVertex;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::Ray;
@@ -13,8 +12,8 @@ use crate::sampling::Sampler;
 use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
 use crate::transport::walk::visibility::shadow_ray;
+use crate::transport::wavefront::TO_ENVIRONMENT;
 use crate::transport::wavefront::Wavefront;
-use crate::transport::wavefront::driver::TO_ENVIRONMENT;
 use glam::Vec3;
 
 impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {

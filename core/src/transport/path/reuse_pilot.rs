@@ -5,11 +5,11 @@
 //! direct light, or behind mirrors and glass.
 
 use super::PathIntegrator;
+use super::TileSampler;
 use super::estimator::LightEstimator;
 use super::reuse::PathReuse;
 use super::sharing::PathWave;
 use super::sharing::Sharing;
-use super::tile::TileSampler;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Tile};
@@ -135,10 +135,10 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         self.mean_of(Some(PathClasses::WITHOUT_VISIBLE_EMITTERS), task, wave, scratch)
     }
 
-    /// Mean radiance of the classes `components`, or of all light.
+    /// Mean radiance of `classes`, or of all light.
     fn mean_of(
         &self,
-        components: Option<PathClasses>,
+        classes: Option<PathClasses>,
         task: usize,
         wave: usize,
         scratch: &mut Arena,
@@ -154,7 +154,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
                 return Ok(sum / all.max(1) as f32);
             }
             for path in &mut wave.wave.paths[..count] {
-                path.components = components.unwrap_or(path.components);
+                path.classes = classes.unwrap_or(path.classes);
             }
             self.advance(&mut wave, count, &mut Counters::default());
             let paths = &wave.wave.paths[..count];

@@ -1,11 +1,11 @@
 //! Shading of a block of vertices in textbook order, step by step for the whole block: escape and emission,
-//! light of the estimator, next-event estimation (`direct.rs`), next direction (`scatter.rs`).
+//! light of the estimator, next-event estimation (`direct.rs`), next direction by BSDF sampling and Russian
+//! roulette.
 
 use super::PathIntegrator;
-use super::estimator::{EmissionHit, KnownLight, LightEstimator, RemainingLight};
+use super::estimator::{EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight};
 use super::sharing::PathMemory;
 use super::sharing::Sharing;
-use super::vertex::PathVertex;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::{Hit, Ray};
@@ -15,6 +15,7 @@ use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
 use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
+use crate::transport::walk::termination::{continuation_probability, is_cut};
 use crate::transport::wavefront::{BLOCK, PathState, Shade, Wavefront};
 use bytemuck::Zeroable;
 use core::ops::Range;
@@ -139,7 +140,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             return Err(None);
         }
         let bsdf = self.context.bsdf_at(point);
-        if path.components.ends_at(&bsdf) {
+        if path.classes.ends_at(&bsdf) {
             return Err(None);
         }
         if segments > 1 {
@@ -170,8 +171,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             apart: F::GLOSSY
                 && E::SEPARATES_COATS
                 && bsdf.gathers_photons_on_base(self.context.separates_coats()),
-            came: path.components,
-            rest: path.components.behind(&bsdf),
+            came: path.classes,
+            rest: path.classes.behind(&bsdf),
             bsdf,
         })
     }
@@ -179,8 +180,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     /// Adds radiance of the environment along the escaping ray.
     fn escape(&self, path: &mut PathState, state: &E::State, ray: &Ray) {
         let scene = self.context.scene;
-        let Some(environment) = scene.environment.as_ref().filter(|_| path.components.has_environment())
-        else {
+        let Some(environment) = scene.environment.as_ref().filter(|_| path.classes.has_environment()) else {
             return;
         };
         let (position, direction) = (Vec3::from(path.position), Vec3::from(ray.direction));
@@ -198,7 +198,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     /// Adds emission of the surface at `point`.
     #[inline]
     fn emission(&self, path: &mut PathState, state: &E::State, point: &SurfacePoint, direction: Vec3) {
-        if !(point.material.emits() && path.components.has_emission()) {
+        if !(point.material.emits() && path.classes.has_emission()) {
             return;
         }
         let (scene, triangle) = (self.context.scene, point.triangle);
@@ -233,5 +233,62 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             path.blur = (Rgb::from(path.blur) + R::throughput(shared, vertex.throughput) * blur).to_array();
         };
         self.estimator.at_vertex((&self.context, &self.settings), vertex, state, found, &mut add)
+    }
+
+    /// Next ray of the path from `vertex`, if the path survives, to find the `rest` of the light.
+    #[inline]
+    fn scatter(
+        &self,
+        Path { path, state, shared }: Path<E::State, R::State>,
+        vertex: &PathVertex,
+        rest: &RemainingLight,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        let PathVertex { point, ref bsdf, ref sampler, wo, first, segments, apart, .. } = *vertex;
+        let [u, v] = dimension::scattering(sampler, segments);
+        let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
+        let (sample, is_narrow) = match apart {
+            true => bsdf.sample_apart::<F>(wo, [u, v, lobe])?,
+            false => bsdf.sample::<F>(wo, [u, v, lobe]).map(|sample| (sample, sample.delta))?,
+        };
+        R::sample_bsdf(shared, || match is_narrow {
+            true => Rgb::ZERO,
+            false if apart => Rgb::ONE,
+            false => bsdf.base_part(wo, sample.direction, sample.weight * sample.pdf),
+        });
+        path.classes = if is_narrow { rest.narrow } else { rest.wide? };
+        let mut throughput = vertex.throughput * sample.weight;
+        let survives = R::leave(shared, (point, bsdf), throughput, segments);
+        let direction = point.frame.to_world(sample.direction);
+        if !point.sides_agree(sample.direction, direction) {
+            return None;
+        }
+        path.eta_squared *= sample.eta * sample.eta;
+        let pixel_throughput = R::throughput(shared, throughput) * path.eta_squared;
+        let continuation_probability =
+            if survives { 1.0 } else { continuation_probability(segments, pixel_throughput) };
+        if continuation_probability < 1.0 {
+            if sampler.single(first + dimension::ROULETTE) >= continuation_probability {
+                return None;
+            }
+            throughput /= continuation_probability;
+        }
+        if throughput == Rgb::ZERO {
+            return None;
+        }
+        if is_cut(segments, bsdf, &sample) {
+            counters.dropped.unfinished += 1;
+            return None;
+        }
+        self.estimator.scattered(&self.context, vertex, state, (&sample, is_narrow));
+        path.throughput = throughput.to_array();
+        // MIS compares one BSDF sample with n light samples.
+        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf / rest.light_samples as f32 };
+        path.position = point.position.to_array();
+        path.normal = vertex.normal.to_array();
+        path.travelled = vertex.travelled;
+        path.segments += 1;
+        path.triangle = point.triangle;
+        Some(point.spawn(direction))
     }
 }

@@ -9,8 +9,7 @@ use crate::photon::{
 };
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::estimator::{KnownLight, LightEstimator, RemainingLight};
-use crate::transport::path::vertex::PathVertex;
+use crate::transport::path::estimator::{KnownLight, LightEstimator, PathVertex, RemainingLight};
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::PathSettings;
 use crate::transport::walk::context::SceneContext;

@@ -1,8 +1,7 @@
 //! Bidirectional path tracing, light tracing, and vertex connection and merging in the program. Path tracing
 //! takes their place where light paths do not pay.
 
-use super::adapter::Adapter;
-use super::{Attempt, Method, PhotonView, Plan, RenderSetup, Renderer, path};
+use super::{Adapter, Attempt, Method, PhotonView, Plan, RenderSetup, Renderer, path};
 use crate::render::RenderError;
 use crate::render::memory::{Bank, Memory};
 use crate::render::threads::{ThreadedRound, Threads};

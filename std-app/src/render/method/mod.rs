@@ -4,7 +4,6 @@
 //! ("The unit of work" in docs/architecture.md). A new method needs a variant and a row in
 //! [`properties`](self::properties), and an arm in [`set_up`].
 
-mod adapter;
 mod bidirectional;
 mod cache_memory;
 mod cache_settings;
@@ -20,26 +19,28 @@ pub use halflight_core::method::PhotonSettings;
 pub use photon_view::{MapView, PhotonView};
 pub use properties::Method;
 
+use super::audit::Audit;
 use super::memory::Memory;
 use super::rewritten_file::RewrittenFile;
 use super::run::path_settings;
 use super::survey::Survey;
-use super::threads::ThreadedRound;
+use super::threads::{ThreadedRound, Threads};
 use super::workers::Workers;
 use super::{RenderError, Settings};
 use crate::save::Patience;
-use adapter::Adapter;
+use core::marker::PhantomData;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::findings::Findings;
 use halflight_core::light::LightSampler;
-use halflight_core::method::RenderContext;
+use halflight_core::memory::{Footprint, Line, OutOfMemory};
 use halflight_core::method::caustics::CausticPathTracing;
 use halflight_core::method::counts::Choice;
 use halflight_core::method::instant_radiosity::InstantRadiosity;
 use halflight_core::method::metropolis::Metropolis;
 use halflight_core::method::photon_map::PhotonMapping;
 use halflight_core::method::sppm::ProgressivePhotonMapping;
+use halflight_core::method::{Method as CoreMethod, RenderContext};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
 
@@ -202,4 +203,54 @@ pub(super) trait Renderer {
 
     /// Decisions and numbers of its parts.
     fn findings(&self) -> Findings;
+}
+
+/// A method with working memory for each thread.
+struct Adapter<'a, F, M> {
+    setup: RenderSetup<'a>,
+    method: M,
+    scratch: Vec<Vec<Line>>,
+    chosen: Method,
+    features: PhantomData<F>,
+}
+
+impl<'a, F: Features, M: CoreMethod> Adapter<'a, F, M> {
+    /// The method that `new` makes with `scratch` for each thread, besides the bytes that the audit will take.
+    fn boxed<'s: 'a>(
+        setup: &RenderSetup<'s>,
+        memory: &mut Memory<'a>,
+        (chosen, scratch): (Method, Footprint),
+        new: impl FnOnce(&mut Memory<'a>, &mut Threads, usize) -> Result<M, OutOfMemory>,
+    ) -> Result<Box<dyn Renderer + 'a>, RenderError>
+    where
+        M: 'a,
+    {
+        let mut scratch = memory.take_each("paths", scratch, setup.workers.count())?;
+        let reserve = Audit::bytes::<F>(setup, chosen.is_biased());
+        let method = new(memory, &mut Threads::new(setup.workers, &mut scratch), reserve)?;
+        Ok(Box::new(Self::with(setup, (chosen, scratch), method)))
+    }
+
+    /// A method that is set up.
+    fn with(setup: &RenderSetup<'a>, (chosen, scratch): (Method, Vec<Vec<Line>>), method: M) -> Self {
+        Self { setup: *setup, method, scratch, chosen, features: PhantomData }
+    }
+}
+
+impl<F: Features, M: CoreMethod> Renderer for Adapter<'_, F, M> {
+    fn chosen(&self) -> Method {
+        self.chosen
+    }
+
+    fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
+        Ok(round.run(&mut self.scratch, |round| self.method.round(round))?)
+    }
+
+    fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
+        Ok(photon_view::render::<F>(&self.setup, &self.method.last_maps()?)?)
+    }
+
+    fn findings(&self) -> Findings {
+        self.method.findings()
+    }
 }

@@ -1,7 +1,6 @@
 //! Path tracing with all of its means in the program: path reuse and caustic photons.
 
-use super::adapter::Adapter;
-use super::{Attempt, Borrower, Method, Plan, RenderSetup};
+use super::{Adapter, Attempt, Borrower, Method, Plan, RenderSetup};
 use crate::render::RenderError;
 use crate::render::audit::Audit;
 use crate::render::memory::Memory;
