@@ -7,7 +7,7 @@
 const MAX_VALUES: usize = 12;
 
 /// Largest number of findings of a list.
-const MAX_FINDINGS: usize = 8;
+const MAX_FINDINGS: usize = 12;
 
 /// Use of a part of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -108,12 +108,12 @@ impl Finding {
     }
 }
 
-/// List of at most eight findings.
+/// List of at most twelve findings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Findings([Option<Finding>; MAX_FINDINGS]);
 
 impl Findings {
-    /// Appends a finding. A ninth finding is ignored.
+    /// Appends a finding. A thirteenth finding is ignored.
     pub fn push(&mut self, finding: Finding) {
         if let Some(free) = self.0.iter_mut().find(|slot| slot.is_none()) {
             *free = Some(finding);

@@ -10,6 +10,7 @@ from scene_file import write_scene
 from workbench import np, write_picture
 
 FOLDER = workbench.HERE / "scenes"
+HARD = FOLDER / "hard"
 SIZE = [96, 96]
 CAMERA = {"eye": [0.0, 0.2, 4.2], "look_at": [0.0, -0.1, 0.0], "up": [0.0, 1.0, 0.0], "fov": 34.0}
 
@@ -105,12 +106,12 @@ class Model:
         self.use("floor", material)
         self.quad([-3, -1, 3], [6, 0, 0], [0, 0, -6], repeat)
 
-    def write(self, name, **more):
-        (FOLDER / f"{name}.obj").write_text("\n".join([f"mtllib {name}.mtl", *self.lines, ""]))
+    def write(self, name, folder=FOLDER, **more):
+        (folder / f"{name}.obj").write_text("\n".join([f"mtllib {name}.mtl", *self.lines, ""]))
         text = "\n".join(f"newmtl {key}\n{value}\n" for key, value in self.materials.items())
-        (FOLDER / f"{name}.mtl").write_text(text)
+        (folder / f"{name}.mtl").write_text(text)
         description = {"render": {"size": SIZE}, "camera": CAMERA, "mesh": [{"file": f"{name}.obj"}]}
-        write_scene(FOLDER / f"{name}.toml", description | more)
+        write_scene(folder / f"{name}.toml", description | more)
 
 
 def boxes(model, tall=WHITE, low=WHITE):
@@ -284,10 +285,84 @@ def smooth_normals():
     model.write("smooth-normals")
 
 
+def closed_room(model):
+    """The room with the wall behind the camera, which stands inside."""
+    model.room(lamp=None)
+    model.use("white", WHITE)
+    model.quad([1, -1, 1], [-2, 0, 0], [0, 2, 0])
+
+
+INSIDE = {"camera": CAMERA | {"eye": [0.0, 0.1, 0.95], "look_at": [0.0, -0.2, 0.0], "fov": 80.0}}
+PANE = "Kd 0 0 0\nNi 1.5\nTf 1 1 1\nillum 7"
+
+
+def up_light():
+    """All light comes by way of the ceiling."""
+    model = Model()
+    closed_room(model)
+    boxes(model)
+    model.use("shade", "Kd 0.3 0.3 0.3")
+    model.quad([-0.15, 0.2, -0.15], [0.3, 0, 0], [0, 0, 0.3])
+    for corner, edge in (([-0.15, 0.2, -0.15], [0.3, 0, 0]), ([0.15, 0.2, -0.15], [0, 0, 0.3]),
+                         ([0.15, 0.2, 0.15], [-0.3, 0, 0]), ([-0.15, 0.2, 0.15], [0, 0, -0.3])):
+        model.quad(corner, edge, [0, 0.15, 0])
+        model.quad(corner, [0, 0.15, 0], edge)
+    model.use("lamp", "Kd 0 0 0\nKe 160 140 120")
+    model.quad([-0.1, 0.21, 0.1], [0.2, 0, 0], [0, 0, -0.2])
+    model.write("up-light", HARD, **INSIDE)
+
+
+def glass_lamp():
+    """All light comes through a glass ball around the lamp."""
+    model = Model()
+    closed_room(model)
+    boxes(model)
+    model.use("ball", PANE)
+    model.sphere([0.0, 0.6, 0.0], 0.2, 3, smooth=True)
+    model.use("lamp", "Kd 0 0 0\nKe 700 600 500")
+    model.sphere([0.0, 0.6, 0.0], 0.03, 1)
+    model.write("glass-lamp", HARD, **INSIDE)
+
+
+def keyhole():
+    """All light comes through a slot from the room behind the wall."""
+    model = Model()
+    closed_room(model)
+    boxes(model)
+    model.use("wall", WHITE)
+    low, high, left, right = -0.1, 0.3, -0.1, 0.1
+    for corner, u, v in (([-1, -1, -0.6], [2, 0, 0], [0, 1 + low, 0]), ([-1, high, -0.6], [2, 0, 0], [0, 1 - high, 0]),
+                         ([-1, low, -0.6], [1 + left, 0, 0], [0, high - low, 0]),
+                         ([right, low, -0.6], [1 - right, 0, 0], [0, high - low, 0])):
+        model.quad(corner, u, v)
+        model.quad(corner, v, u)
+    model.use("lamp", "Kd 0 0 0\nKe 240 210 180")
+    model.quad([-0.9, 0.99, -0.95], [0.3, 0, 0], [0, 0, 0.3])
+    model.write("keyhole", HARD, **INSIDE)
+
+
+def rings():
+    """Caustics of metal rings on a table."""
+    model = Model()
+    model.room(lamp=0.1)
+    model.use("ring", "Kd 0.9 0.7 0.4\nPm 1\nPr 0.1")
+    turns = 2 * np.pi * np.arange(65) / 64
+    for x, z, radius in ((-0.4, 0.2, 0.35), (0.4, 0.0, 0.4)):
+        circle = np.stack([x + radius * np.cos(turns), 0 * turns, z + radius * np.sin(turns)], axis=1)
+        points = np.concatenate([circle - [0, 1, 0], circle - [0, 0.75, 0]])
+        inwards = np.stack([-np.cos(turns), 0 * turns, -np.sin(turns)], axis=1)
+        faces = [[i, i + 65, i + 1] for i in range(64)] + [[i + 1, i + 65, i + 66] for i in range(64)]
+        model.triangles(points, faces, normals=np.concatenate([inwards, inwards]))
+        faces = [face[::-1] for face in faces]
+        model.triangles(points, faces, normals=-np.concatenate([inwards, inwards]))
+    model.write("rings", HARD)
+
+
 SCENES = [diffuse, mirror, glass, rough_glass, metal, plastic, varnish, textured, point, spot, directional]
 SCENES += [constant, lens, many_lights, bent_normals, smooth_normals]
+SCENES += [up_light, glass_lamp, keyhole, rings]
 
 if __name__ == "__main__":
-    FOLDER.mkdir(exist_ok=True)
+    HARD.mkdir(parents=True, exist_ok=True)
     for make in SCENES:
         make()

@@ -9,6 +9,7 @@ mod bsdf;
 mod cache_file;
 mod caustics;
 mod caustics_cached;
+mod choice;
 mod counts;
 mod environment_visibility;
 mod far;

@@ -6,6 +6,7 @@
 
 pub mod bidirectional;
 pub mod caustics;
+pub mod choice;
 #[cfg(test)]
 mod closed_box;
 pub mod counts;

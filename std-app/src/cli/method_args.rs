@@ -42,7 +42,9 @@ impl ValueEnum for MethodArg {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let about = self.0.map_or("path, or sppm if caustics bring most of the light", Method::about);
+        let about = self
+            .0
+            .map_or("path, irradiance-cache or vcm: the one with the least predicted error", Method::about);
         Some(PossibleValue::new(self.name()).help(about))
     }
 }

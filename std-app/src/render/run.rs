@@ -78,10 +78,9 @@ impl WithFeatures for Render<'_> {
         let most = memory.for_file();
         let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
         let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
-        // A film file holds the method that a prepass chose.
-        let chosen = |method: &Method| *method == Method::ProgressivePhotons;
-        let of_film = resumed.as_ref().and_then(|film| film.header.method()).filter(chosen);
-        let method = if settings.method.is_some() { method } else { of_film.unwrap_or(method) };
+        // A film file holds the method that prepasses chose.
+        let of_film = resumed.as_ref().and_then(|film| film.header.method());
+        let method = settings.method.or(of_film).unwrap_or(method);
         let identity =
             |method: Method| Identity::of(scene, method, &path_settings(settings), settings, cache.clone());
         if let Some(film) = &resumed {
@@ -115,7 +114,8 @@ impl WithFeatures for Render<'_> {
         let setup = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let plain = setup.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
-        let mut plan = Plan::from(method);
+        let is_open = settings.method.is_none() && resumed.is_none();
+        let mut plan = if is_open { Plan::open() } else { Plan::from(method) };
         loop {
             let bank = Bank::new();
             let mut own = memory.within(&bank);
@@ -123,7 +123,7 @@ impl WithFeatures for Render<'_> {
                 Attempt::Ready(renderer) => renderer,
                 Attempt::Instead(better) => {
                     memory.release(&own);
-                    plan = better;
+                    plan = *better;
                     continue;
                 }
             };

@@ -17,8 +17,6 @@ pub(super) const FIRST_RADIUS: f64 = 1.0;
 pub struct CausticSettings {
     /// Whether an irradiance cache has the light that rough surfaces reflect.
     pub beside_records: bool,
-    /// Whether progressive photon mapping is a choice.
-    pub allows_photons_alone: bool,
     /// Bytes that photons leave for others.
     pub reserved: usize,
 }

@@ -77,8 +77,7 @@ pub struct CausticPathTracing<'a, F> {
 }
 
 impl<'a, F: Features> CausticPathTracing<'a, F> {
-    /// `paths` joined with photons if a prepass finds that they pay. `None` if photons should carry all of
-    /// the light, by [`Decision::ProgressivePhotons`].
+    /// `paths` joined with photons if a prepass finds that they pay.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`].
@@ -88,14 +87,13 @@ impl<'a, F: Features> CausticPathTracing<'a, F> {
         settings: CausticSettings,
         memory: &mut impl MemorySource<'a>,
         executor: &mut impl Executor,
-    ) -> Result<Option<Self>, OutOfMemory> {
+    ) -> Result<Self, OutOfMemory> {
         let Prepass { decision, share, lacks_memory } =
             prepass(context, &mut paths, settings, memory, executor)?;
         let mut method =
             Self { paths, photons: None, finding: CausticUse { used: false, share, lacks_memory } };
         let emission = match decision {
-            Decision::Paths => return Ok(Some(method)),
-            Decision::ProgressivePhotons => return Ok(None),
+            Decision::Paths => return Ok(method),
             Decision::Photons(emission) => emission,
         };
         match CausticPhotons::new(context, emission, settings, memory)? {
@@ -105,7 +103,7 @@ impl<'a, F: Features> CausticPathTracing<'a, F> {
                 method.photons = method.finding.used.then_some(photons);
             }
         }
-        Ok(Some(method))
+        Ok(method)
     }
 
     /// `paths` alone, after the `finding` of a prepass.

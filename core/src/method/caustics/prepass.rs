@@ -1,7 +1,7 @@
 //! The prepass of caustic photons: light paths aimed at all mirrors and dielectrics teach the emission guide
 //! which of them the camera sees, and show whether photons pay.
 
-use super::benefit::{Benefit, missing, visible};
+use super::benefit::{Benefit, missing};
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
 use crate::bsdf::Features;
 use crate::light::{EmissionSampler, GuideStats, LightSampler};
@@ -20,14 +20,7 @@ const STEP: usize = 32 * PATHS_PER_TASK;
 /// Numbers of the photon maps whose light paths are used.
 const AIMED_MAP: u32 = 0;
 const LEARNED_MAP: u32 = 1;
-const BY_POWER_MAP: u32 = 2;
 const AUDIT_MAP: u32 = 0x7fff_ff00;
-
-/// Fraction of the picture's light from which on photons may carry all of it: path tracing finds next to
-/// none. The photons of that method are not aimed: so many of them must be visible, relative to those that
-/// are.
-const MOST_SHARE: f64 = 0.75;
-const LEAST_BY_POWER: f64 = 0.25;
 
 /// How often the paths of an audit must find light to know of it.
 const FEWEST_HITS: f64 = 64.0;
@@ -35,14 +28,12 @@ const FEWEST_HITS: f64 = 64.0;
 /// The name of the emission sampler and its guide in reports of memory.
 const EMISSION: &str = "emission";
 
-/// The method that suits a picture.
+/// Whether photons suit a picture.
 pub enum Decision<'a> {
     /// Paths alone.
     Paths,
     /// Paths joined with caustic photons.
     Photons(CausticEmission<'a>),
-    /// Stochastic progressive photon mapping: photons for all of the light.
-    ProgressivePhotons,
 }
 
 /// The result of a prepass.
@@ -102,9 +93,8 @@ pub fn prepass<'a, F: Features>(
         };
         let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
         let mut learning = Learning { light_paths, paths, share: None };
-        let decision = match learning.run(&by_power, settings.allows_photons_alone, arena)? {
+        let decision = match learning.run(&by_power, arena)? {
             Learned::Paths => Decision::Paths,
-            Learned::ProgressivePhotons => Decision::ProgressivePhotons,
             Learned::Photons(stats, benefit) => {
                 let mut arena = memory.take(EMISSION, kept)?;
                 let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut arena)?;
@@ -120,7 +110,6 @@ pub fn prepass<'a, F: Features>(
 enum Learned<'l> {
     Paths,
     Photons(GuideStats<'l>, Benefit),
-    ProgressivePhotons,
 }
 
 /// A prepass at work.
@@ -134,7 +123,6 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
     fn run<'l>(
         &mut self,
         by_power: &EmissionSampler<'l>,
-        allows_photons_alone: bool,
         arena: &mut Arena<'l>,
     ) -> Result<Learned<'l>, OutOfMemory> {
         let RenderContext { scene, lights, .. } = *self.light_paths.context;
@@ -155,13 +143,6 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         self.light_paths.teach(&mut stats);
         let mean = self.other_light(&learned)?;
         let benefit = self.benefit(step, mean);
-        if allows_photons_alone && benefit.share >= MOST_SHARE {
-            self.light_paths.trace::<F>(by_power, step, BY_POWER_MAP)?;
-            let visible = visible(self.light_paths.found);
-            if visible > 0.0 && visible >= LEAST_BY_POWER * benefit.visible {
-                return Ok(Learned::ProgressivePhotons);
-            }
-        }
         Ok(if self.pays(&benefit)? { Learned::Photons(stats, benefit) } else { Learned::Paths })
     }
 

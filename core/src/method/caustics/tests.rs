@@ -46,8 +46,7 @@ fn picture(
     let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));
     let paths = PathTracing::<All>::new(context, Some(false), &mut executor)?;
     let settings = CausticSettings::default();
-    let method = CausticPathTracing::new(context, paths, settings, &mut buffer, &mut executor)?;
-    let mut method = method.expect("photons for all of the light were not a choice");
+    let mut method = CausticPathTracing::new(context, paths, settings, &mut buffer, &mut executor)?;
     let pixels = film(context, &mut executor, division, |round| method.round(round))?;
     Ok((pixels, method.finding(), method.statistics()))
 }

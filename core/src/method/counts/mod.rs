@@ -24,7 +24,7 @@ const LEAST_GAIN: f32 = 1.15;
 
 /// Gain of path reuse at most, that of the ablation: its own pilot misses rare light, which reuse does not
 /// help, and promises up to 10.
-const REUSE_GAIN: f64 = 2.5;
+pub(super) const REUSE_GAIN: f64 = 2.5;
 
 /// Share of the light in caustics from which on the photons of path tracing are its means: 0.28 to 0.97 in
 /// caustic scenes, 0.08 on veach-bidir, where light paths find more than caustics.

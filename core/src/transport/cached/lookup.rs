@@ -29,6 +29,8 @@ const SMALL: f32 = 0.1;
 pub enum CacheView<'a> {
     /// Frozen caches of even and of odd samples.
     Pair([&'a IrradianceCache<'a>; 2]),
+    /// Caches that know the light of every point, which is none: the measure of what stays with paths.
+    Known,
     /// One cache with its present records. The first valid record is enough for gather rays, which are
     /// averaged.
     UnderConstruction(&'a IrradianceCache<'a>),
@@ -53,6 +55,10 @@ impl CacheView<'_> {
                     let reach = cache.at_all(level, points, found);
                     exposed.iter_mut().zip(reach).for_each(|(exposed, reach)| *exposed = exposed.max(reach));
                 }
+            }
+            CacheView::Known => {
+                let known = CachedIrradiance { irradiance: Rgb::ZERO, shining: 0.0 };
+                queries.for_each(|(i, _)| found[i] = Some(known));
             }
             CacheView::UnderConstruction(cache) => {
                 for (i, (query, _)) in queries {
@@ -84,7 +90,7 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {
         match self {
             // With cut-outs each path has memory for one shadow ray.
-            CacheView::Pair(_) if !context.has_cutouts => LIGHT_SAMPLES,
+            CacheView::Pair(_) | CacheView::Known if !context.has_cutouts => LIGHT_SAMPLES,
             _ => 1,
         }
     }
@@ -149,6 +155,11 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     /// since records do not store their distance from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> PathIntegrator<'a, F, CacheView<'a>> {
         self.with_estimator(CacheView::Pair(caches))
+    }
+
+    /// This path tracer without the light that caches would know.
+    pub fn with_known_irradiance(&self) -> PathIntegrator<'a, F, CacheView<'a>> {
+        self.with_estimator(CacheView::Known)
     }
 
     /// This path tracer for gather rays, with the records that `cache` has so far.

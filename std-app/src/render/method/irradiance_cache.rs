@@ -49,7 +49,7 @@ fn find_caustics<'m, F: Features>(
     let mut scratch = memory.take_each("paths", scratch, workers.count())?;
     let context = setup.context();
     let mut paths = PathTracing::<F>::plain(&context);
-    let settings = CausticSettings { beside_records: true, allows_photons_alone: false, reserved };
+    let settings = CausticSettings { beside_records: true, reserved };
     let mut executor = Threads::new(workers, &mut scratch);
     let Prepass { decision, share, lacks_memory } =
         prepass(&context, &mut paths, settings, memory, &mut executor)?;
@@ -57,7 +57,7 @@ fn find_caustics<'m, F: Features>(
     memory.give_back("paths");
     let emission = match decision {
         Decision::Photons(emission) => Some(emission),
-        Decision::Paths | Decision::ProgressivePhotons => None,
+        Decision::Paths => None,
     };
     let caustics = CausticUse { used: emission.is_some(), share, lacks_memory };
     Ok((emission, caustics))
@@ -104,8 +104,7 @@ impl<'m, F: Features> Cached<'m, F> {
         let photons = match emission {
             Some(emission) => {
                 let reserved = cache_memory::later(&cache);
-                let settings =
-                    CausticSettings { beside_records: true, allows_photons_alone: false, reserved };
+                let settings = CausticSettings { beside_records: true, reserved };
                 CausticPhotons::new(&setup.context(), emission, settings, memory)?
             }
             None => None,

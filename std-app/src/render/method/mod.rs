@@ -2,14 +2,16 @@
 //!
 //! A round consists of passes over a method's structures and of tiles of the picture, all run in parallel
 //! ("The unit of work" in docs/architecture.md). A new method needs a variant and a row in
-//! [`properties`](self::properties), and an arm in [`set_up`].
+//! [`properties`], and an arm in [`set_up`].
 
 mod bidirectional;
 mod cache_memory;
 mod cache_settings;
+mod choice;
 mod irradiance_cache;
 mod path;
 mod photon_view;
+mod prepared;
 mod properties;
 #[cfg(test)]
 mod wrong;
@@ -43,19 +45,39 @@ use halflight_core::method::sppm::ProgressivePhotonMapping;
 use halflight_core::method::{Method as CoreMethod, RenderContext};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
+use prepared::Prepared;
 
 /// A method to set up, with the decisions of prepasses that have run.
 pub(super) struct Plan<'a, F> {
     method: Method,
+    /// The method in whose place it renders.
+    chosen: Method,
+    /// Whether prepasses may choose another method.
+    is_open: bool,
     /// Path tracing without caustic photons, by its prepass.
     paths: Option<Box<CausticPathTracing<'a, F>>>,
-    /// The method in whose place this one renders, and its choice.
-    counts: Option<(Method, Choice)>,
+    /// Counts of bidirectional techniques.
+    counts: Option<Choice>,
+    /// Findings of the prepasses.
+    findings: Findings,
 }
 
 impl<F> From<Method> for Plan<'_, F> {
     fn from(method: Method) -> Self {
-        Self { method, paths: None, counts: None }
+        let findings = Findings::default();
+        Self { method, chosen: method, is_open: false, paths: None, counts: None, findings }
+    }
+}
+
+impl<F> Plan<'_, F> {
+    /// Path tracing, unless prepasses predict less error by another method.
+    pub(super) fn open() -> Self {
+        Self { is_open: true, ..Method::Path.into() }
+    }
+
+    /// A bidirectional method with the counts of `choice`.
+    fn with_counts(method: Method, choice: Choice) -> Self {
+        Self { counts: Some(choice), findings: choice.findings(), ..method.into() }
     }
 }
 
@@ -64,7 +86,7 @@ pub(super) enum Attempt<'a, 'm, F> {
     /// The method, with its structures in memory.
     Ready(Box<dyn Renderer + 'm>),
     /// A prepass prefers this plan, for which the memory of the attempt is to be released first.
-    Instead(Plan<'a, F>),
+    Instead(Box<Plan<'a, F>>),
 }
 
 /// Takes memory and sets up the method of `plan`.
@@ -74,8 +96,9 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     memory: &mut Memory<'m>,
 ) -> Result<Attempt<'a, 'm, F>, RenderError> {
     let (context, settings, method) = (&setup.context(), setup.settings, plan.method);
+    let (chosen, findings) = (plan.chosen, plan.findings);
     let renderer: Box<dyn Renderer + 'm> = match method {
-        Method::Path => match path::set_up(setup, memory, plan.paths)? {
+        Method::Path => match path::set_up(plan, setup, memory)? {
             Attempt::Ready(renderer) => renderer,
             instead => return Ok(instead),
         },
@@ -93,7 +116,10 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
             })?
         }
         Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
-            return bidirectional::set_up(plan, setup, memory);
+            match bidirectional::set_up(plan, setup, memory)? {
+                Attempt::Ready(renderer) => renderer,
+                instead => return Ok(instead),
+            }
         }
         Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
             let form = (method == Method::ClampedInstantRadiosity, settings.reuse);
@@ -112,11 +138,13 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
         #[cfg(test)]
         Method::Wrong => Box::new(wrong::Wrong::<F>::new(setup, memory)?),
     };
-    Ok(Attempt::Ready(match plan.counts {
-        Some((chosen, choice)) => bidirectional::chosen(chosen, choice, renderer),
-        None => renderer,
-    }))
+    let renderer: Box<dyn Renderer + 'm> = match findings == Findings::default() {
+        true => renderer,
+        false => Box::new(Prepared { renderer, chosen, findings }),
+    };
+    Ok(Attempt::Ready(renderer))
 }
+
 /// Structures that all methods use.
 #[derive(Clone, Copy)]
 pub(super) struct RenderSetup<'a> {

@@ -1,12 +1,16 @@
 //! Path tracing with all of its means in the program: path reuse and caustic photons.
 
+use super::choice::{Chosen, choose};
+use super::prepared::Prepared;
 use super::{Adapter, Attempt, Borrower, Method, Plan, RenderSetup};
 use crate::render::RenderError;
 use crate::render::audit::Audit;
 use crate::render::memory::Memory;
 use crate::render::threads::Threads;
 use halflight_core::bsdf::Features;
-use halflight_core::method::caustics::{CausticPathTracing, CausticPhotons, CausticSettings, scratch};
+use halflight_core::findings::Findings;
+use halflight_core::method;
+use halflight_core::method::caustics::{CausticPathTracing, CausticPhotons, CausticSettings, CausticUse};
 use halflight_core::method::path::PathTracing;
 
 /// Whether the scene can have caustics and photons are enabled.
@@ -14,44 +18,58 @@ pub(super) fn are_possible(setup: &RenderSetup) -> bool {
     setup.settings.caustics && halflight_core::method::caustics::are_possible(setup.scene)
 }
 
-/// Sets up path tracing, with caustic photons if they pay; with `paths` alone if a prepass has made them.
-/// Photons that do not pay release their memory.
+/// Sets up path tracing, with caustic photons if they pay; with the paths of `plan` alone if a prepass has
+/// made them. Photons that do not pay release their memory. Where the plan is open, another method may take
+/// its place.
 pub(super) fn set_up<'a: 'm, 'm, F: Features>(
+    plan: Plan<'a, F>,
     setup: &RenderSetup<'a>,
     memory: &mut Memory<'m>,
-    paths: Option<Box<CausticPathTracing<'a, F>>>,
 ) -> Result<Attempt<'a, 'm, F>, RenderError> {
     let RenderSetup { settings, workers, .. } = *setup;
     let context = setup.context();
-    if paths.is_none() && !are_possible(setup) {
-        let scratch = (Method::Path, PathTracing::<F>::scratch());
-        let paths = Adapter::<F, _>::boxed(setup, memory, scratch, |_, executor, _| {
-            PathTracing::<F>::new(&context, settings.reuse, executor)
-        })?;
-        return Ok(Attempt::Ready(paths));
-    }
-    let mut scratch = memory.take_each("paths", scratch::<F>(), workers.count())?;
-    if let Some(paths) = paths {
+    let has_prepass = plan.paths.is_none() && are_possible(setup);
+    let scratch = match (has_prepass || plan.paths.is_some(), plan.is_open) {
+        (_, true) => method::choice::scratch::<F>(),
+        (true, _) => method::caustics::scratch::<F>(),
+        (false, _) => PathTracing::<F>::scratch(),
+    };
+    let mut scratch = memory.take_each("paths", scratch, workers.count())?;
+    if let Some(paths) = plan.paths {
         let paths = Adapter::<F, _>::with(setup, (Method::Path, scratch), *paths);
         return Ok(Attempt::Ready(Box::new(paths)));
     }
     let mut executor = Threads::new(workers, &mut scratch);
     let paths = PathTracing::<F>::new(&context, settings.reuse, &mut executor)?;
-    let settings = CausticSettings {
-        beside_records: false,
-        allows_photons_alone: settings.method.is_none() && settings.resume.is_none(),
-        reserved: Audit::bytes::<F>(setup, Method::Path.is_biased()),
-    };
-    let Some(method) = CausticPathTracing::new(&context, paths, settings, memory, &mut executor)? else {
-        return Ok(Attempt::Instead(Method::ProgressivePhotons.into()));
+    let mut method = match has_prepass {
+        false => CausticPathTracing::without_photons(paths, CausticUse::default()),
+        true => {
+            let settings = CausticSettings {
+                beside_records: false,
+                reserved: Audit::bytes::<F>(setup, Method::Path.is_biased()),
+            };
+            CausticPathTracing::new(&context, paths, settings, memory, &mut executor)?
+        }
     };
     let caustics = method.finding();
-    if caustics.used {
-        let method = Adapter::<F, _>::with(setup, (Method::Path, scratch), method);
-        return Ok(Attempt::Ready(Box::new(method)));
+    let mut findings = Findings::default();
+    if plan.is_open
+        && let Some(Chosen { instead, finding }) = choose(&mut method, setup, memory, &mut executor)?
+    {
+        findings = finding.into();
+        if let Some(plan) = instead {
+            return Ok(Attempt::Instead(Box::new(Plan { findings: findings.and(plan.findings), ..plan })));
+        }
     }
-    let paths = Some(Box::new(CausticPathTracing::without_photons(paths, caustics)));
-    Ok(Attempt::Instead(Plan { method: Method::Path, paths, counts: None }))
+    if has_prepass && !caustics.used {
+        let paths = Some(Box::new(CausticPathTracing::without_photons(paths, caustics)));
+        return Ok(Attempt::Instead(Box::new(Plan { paths, findings, ..Method::Path.into() })));
+    }
+    let renderer = Box::new(Adapter::<F, _>::with(setup, (Method::Path, scratch), method));
+    Ok(Attempt::Ready(match plan.is_open {
+        true => Box::new(Prepared { renderer, chosen: Method::Path, findings }),
+        false => renderer,
+    }))
 }
 
 /// Calls `then` with the photons that the picture has now, if any.

@@ -1,0 +1,268 @@
+//! Choice of a method by predicted error.
+//!
+//! A trial path traces a few tiles of the picture twice: once for all light, and once for the light that
+//! stays with paths where an irradiance cache knows the rest. It gives the noise and the work of both, in
+//! rays rather than seconds, so that the choice follows from scene, settings and seed alone. The difference
+//! of the noises is that of the light which records gather, each with many rays.
+
+use super::caustics::{self, CausticPathTracing};
+use super::executor::{Executor, Passed};
+use super::{RenderContext, counts};
+use crate::bsdf::Features;
+use crate::film::{PIXELS_PER_TILE, Pixel};
+use crate::findings::Decision::Used;
+use crate::findings::{Finding, Value};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::transport::path::reuse_pilot::PILOT_TILES;
+use crate::transport::path::{LightEstimator, WAVE};
+use crate::transport::{Counters, PathIntegrator, PathSettings};
+
+/// Samples of a pixel in a trial.
+const SAMPLES: u32 = 4;
+
+/// Pixels of a block, over whose light noise is relative, and blocks of a tile.
+const BLOCK: usize = 64;
+const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
+
+/// Rays per second and thread by which a time is work. The choice depends on it, and on no clock.
+const RAYS_PER_SECOND: f64 = 3e6;
+
+/// Work of a ray of cached paths, with its share of lookups and light samples, and of a gather ray.
+const CACHED_RAY: f64 = 1.8;
+const GATHER_RAY: f64 = 1.5;
+
+/// Gather rays for each pixel of a picture with one pixel; they fall with this power of the pixels.
+/// Measured on 17 scenes at 576 and 4096 pixels, within a factor of two.
+const GATHER_RAYS: f64 = 5700.0;
+const GATHER_POWER: f64 = 0.4;
+
+/// Records that together know the light of a point.
+const RECORDS: f64 = 6.0;
+
+/// relMSE of interpolation, beside the noise of records.
+const BIAS: f64 = 5e-4;
+
+/// Fraction of the work within which caches are filled; records become wider if it is too little.
+const FILLING: f64 = 0.44;
+
+/// Factor on the error of light paths: their pilot promises too much where paths find light rarely.
+const DOUBT: f64 = 2.0;
+
+/// Least ratio of predicted errors for which a method takes the place of path tracing.
+const LEAST_GAIN: f64 = 1.2;
+
+/// End of a picture: the first of these that holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Goal {
+    /// Seconds of all threads together.
+    pub seconds: Option<f64>,
+    /// Samples per pixel of path tracing; of other methods as many as take the same work.
+    pub samples: Option<u32>,
+    /// relMSE.
+    pub error: Option<f64>,
+}
+
+/// Method with the least predicted error or work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Best {
+    /// Path tracing with all of its means.
+    Paths,
+    /// An irradiance cache.
+    Cache,
+    /// Light paths with the counts of a pilot.
+    LightPaths,
+}
+
+/// Sums over the pixels of a block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    pixels: f64,
+    /// Mean of the channels.
+    light: f64,
+    /// Variance of the mean of the samples.
+    variance: f64,
+}
+
+impl Block {
+    fn of(pixels: &[Pixel]) -> Self {
+        let mut block = Self::default();
+        for pixel in pixels.iter().filter(|pixel| pixel.count() > 0) {
+            block.pixels += 1.0;
+            block.light += f64::from(pixel.mean().element_sum()) / 3.0;
+            block.variance += f64::from(pixel.variance().element_sum()) / 3.0;
+        }
+        block
+    }
+}
+
+/// A tile by paths that find all light, and by those that find what records do not know.
+#[derive(Clone, Copy, Default)]
+struct TileTrial {
+    blocks: [[Block; BLOCKS]; 2],
+    rays: [f64; 2],
+}
+
+/// Noise and work of samples of a picture, each of all light and of the light that records do not know.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trial {
+    /// Variance of a sample relative to the light of its block.
+    pub noise: [f64; 2],
+    /// Rays of a sample.
+    pub work: [f64; 2],
+    /// Factor on noise × work by path reuse, or 1.
+    pub reuse: f64,
+    /// Pixels of the picture.
+    pub pixels: f64,
+    /// Gather rays of a record.
+    pub record_rays: f64,
+}
+
+/// Working memory of a worker.
+pub fn scratch<F: Features>() -> Footprint {
+    caustics::scratch::<F>().slice::<Pixel>(PIXELS_PER_TILE)
+}
+
+impl Trial {
+    /// Trial of `paths`, joined with photons if they pay; records would gather light with `record_rays` each.
+    /// `None` where the executor is over.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the scratch of the executor is smaller than [`scratch`].
+    pub fn run<F: Features>(
+        context: &RenderContext,
+        paths: &mut CausticPathTracing<F>,
+        record_rays: u32,
+        executor: &mut impl Executor,
+    ) -> Result<Option<Self>, OutOfMemory> {
+        // Samples that the picture does not have.
+        let settings = PathSettings { seed: !context.settings.seed, ..context.settings };
+        let all = RenderContext { settings, ..*context }.integrator::<F>();
+        let rest = all.with_known_irradiance();
+        let reuse = paths.reuse();
+        let tiles = match paths.photons() {
+            None => trace((&all, &rest), executor)?,
+            Some(photons) => photons.lend(|photons| match photons {
+                Some(photons) => trace((&all.with_caustics(photons), &rest.with_caustics(photons)), executor),
+                None => trace((&all, &rest), executor),
+            })??,
+        };
+        let Some(tiles) = tiles else { return Ok(None) };
+        let reuse = match reuse.pilot.filter(|_| reuse.used) {
+            Some(pilot) => f64::from(pilot.cost()) / f64::from(pilot.gain()).min(counts::REUSE_GAIN),
+            None => 1.0,
+        };
+        let (pixels, record_rays) = (context.pixels() as f64, record_rays.into());
+        Ok(Some(Self { reuse, pixels, record_rays, ..Self::of(&tiles) }))
+    }
+
+    /// Noise and work of `tiles`.
+    fn of(tiles: &[TileTrial]) -> Self {
+        let blocks = || tiles.iter().flat_map(|tile| tile.blocks[0].iter().zip(&tile.blocks[1]));
+        let pixels = blocks().map(|(all, _)| all.pixels).sum::<f64>().max(1.0);
+        let mean = blocks().map(|(all, _)| all.light).sum::<f64>() / pixels;
+        let mut trial = Self::default();
+        for (all, rest) in blocks().filter(|(all, _)| all.pixels > 0.0) {
+            let level = all.light / all.pixels;
+            let scale = level * level + 0.01 * mean * mean;
+            for (noise, block) in trial.noise.iter_mut().zip([all, rest]).filter(|_| scale > 0.0) {
+                *noise += f64::from(SAMPLES) * block.variance / (scale * pixels);
+            }
+        }
+        let rays = |i: usize| tiles.iter().map(|tile| tile.rays[i]).sum::<f64>();
+        trial.work = [0, 1].map(|i| rays(i) / (f64::from(SAMPLES) * pixels));
+        trial
+    }
+
+    /// Work for each pixel that reaches `goal` by path tracing, in rays.
+    fn budget(&self, goal: &Goal) -> f64 {
+        let time = goal.seconds.map(|seconds| seconds * RAYS_PER_SECOND / self.pixels);
+        let samples = goal.samples.map(|samples| f64::from(samples) * self.work[0]);
+        let error = goal.error.map(|error| self.of_paths(1.0) / error);
+        [time, samples, error].into_iter().flatten().fold(f64::INFINITY, f64::min)
+    }
+
+    /// relMSE of path tracing after so much work for each pixel.
+    pub fn of_paths(&self, work: f64) -> f64 {
+        self.reuse * self.noise[0] * self.work[0] / work
+    }
+
+    /// relMSE with an irradiance cache after so much work for each pixel.
+    pub fn of_cache(&self, work: f64) -> f64 {
+        let filling = GATHER_RAY * GATHER_RAYS * libm::pow(self.pixels, -GATHER_POWER);
+        let wider = (filling / (FILLING * work)).max(1.0);
+        let left = work - filling.min(FILLING * work);
+        let gathered = (self.noise[0] - self.noise[1]).max(0.0) / (self.record_rays * RECORDS);
+        self.noise[1] * CACHED_RAY * self.work[1] / left + wider * (gathered + BIAS)
+    }
+
+    /// Whether the pilot of light paths costs little beside the picture.
+    pub fn affords_light_paths(&self, goal: &Goal) -> bool {
+        self.budget(goal) * self.pixels > PILOT_RAYS / PILOT_SHARE
+    }
+
+    /// The method with the least error for `goal`, and the reason; light paths if their pilot ran and found a
+    /// ratio of noise × work of path tracing to theirs.
+    pub fn best(&self, goal: &Goal, may_have_cache: bool, light_paths: Option<f64>) -> (Best, Finding) {
+        let work = self.budget(goal);
+        let paths = self.of_paths(work);
+        let cache = may_have_cache.then(|| self.of_cache(work));
+        let of_light = light_paths.map(|gain| DOUBT * paths / gain.max(1e-3));
+        let mut best = (Best::Paths, paths / LEAST_GAIN, "path tracing has the least error");
+        let others = [
+            (
+                Best::Cache,
+                cache.unwrap_or(f64::INFINITY),
+                "an irradiance cache has less error than path tracing",
+            ),
+            (
+                Best::LightPaths,
+                of_light.unwrap_or(f64::INFINITY),
+                "light paths have less error than paths alone",
+            ),
+        ];
+        for other in others {
+            best = if other.1 < best.1 { other } else { best };
+        }
+        let number = |value| Value::Number(value);
+        let finding = Finding::new("method", Used, best.2)
+            .with("path", number(paths))
+            .with_some("irradiance_cache", cache.map(number))
+            .with_some("light_paths", of_light.map(number));
+        (best.0, finding)
+    }
+}
+
+/// Rays of the pilot of light paths with all of its weightings, and its greatest fraction of the work.
+const PILOT_RAYS: f64 = 5e5;
+const PILOT_SHARE: f64 = 0.04;
+
+/// Traces the tiles of a trial by both integrators.
+fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
+    (all, rest): (&PathIntegrator<F, A>, &PathIntegrator<F, B>),
+    executor: &mut impl Executor,
+) -> Result<Option<[TileTrial; PILOT_TILES]>, OutOfMemory> {
+    let mut tiles = [TileTrial::default(); PILOT_TILES];
+    let Passed { is_complete, .. } =
+        executor.pass(all.pilot_tasks().zip(tiles.iter_mut()), |_, (tile, out), worker| {
+            let mut arena = worker.scratch.scratch();
+            let pixels = arena.slice::<Pixel>(PIXELS_PER_TILE)?;
+            (out.blocks[0], out.rays[0]) = one(all, tile, &mut arena, pixels)?;
+            (out.blocks[1], out.rays[1]) = one(rest, tile, &mut arena, pixels)?;
+            Ok(Counters::default())
+        })?;
+    Ok(is_complete.then_some(tiles))
+}
+
+/// The blocks of a tile, and its rays.
+fn one<F: Features, E: LightEstimator<F>>(
+    integrator: &PathIntegrator<F, E>,
+    tile: usize,
+    arena: &mut Arena,
+    pixels: &mut [Pixel],
+) -> Result<([Block; BLOCKS], f64), OutOfMemory> {
+    pixels.fill(Pixel::default());
+    let counters = integrator.run(tile, 0..SAMPLES, WAVE, arena, pixels)?;
+    let mut blocks = [Block::default(); BLOCKS];
+    blocks.iter_mut().zip(pixels.chunks(BLOCK)).for_each(|(block, pixels)| *block = Block::of(pixels));
+    Ok((blocks, counters.all_rays() as f64))
+}

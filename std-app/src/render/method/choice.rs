@@ -1,0 +1,61 @@
+//! Choice of a method for a picture whose method is left open: path tracing, unless another one has less
+//! predicted error (`core/src/method/choice.rs`).
+
+use super::{Method, Plan, RenderSetup, bidirectional};
+use crate::render::memory::Memory;
+use crate::render::threads::Threads;
+use crate::render::{RenderError, Settings, Stop};
+use halflight_core::bsdf::Features;
+use halflight_core::census::Census;
+use halflight_core::findings::Finding;
+use halflight_core::method::Method as _;
+use halflight_core::method::caustics::CausticPathTracing;
+use halflight_core::method::choice::{Best, Goal, Trial};
+
+/// Outcome of a choice: the plan of another method, and the reason.
+pub(super) struct Chosen<'a, F> {
+    pub(super) instead: Option<Plan<'a, F>>,
+    pub(super) finding: Finding,
+}
+
+/// The method that suits the picture, beside `paths`. `None` where the time is over.
+pub(super) fn choose<'a, F: Features>(
+    paths: &mut CausticPathTracing<F>,
+    setup: &RenderSetup,
+    memory: &mut Memory,
+    executor: &mut Threads,
+) -> Result<Option<Chosen<'a, F>>, RenderError> {
+    let (context, settings) = (setup.context(), setup.settings);
+    let rays = settings.cache.strata().pow(2);
+    let Some(trial) = Trial::run(&context, paths, rays, executor)? else { return Ok(None) };
+    let goal = goal(&settings.stop, setup.workers.count());
+    let may_have_cache = may_have_cache(setup);
+    let light_paths = match trial.affords_light_paths(&goal) {
+        true => bidirectional::choose::<F>(setup, memory, &settings.bidirectional)?,
+        false => None,
+    };
+    let light_paths = light_paths.map(|choice| choice.beside(&paths.findings()));
+    let gain = light_paths.filter(|choice| choice.counts.light_paths > 0.0).and_then(|choice| choice.gain);
+    let (best, finding) = trial.best(&goal, may_have_cache, gain.map(f64::from));
+    let instead = match (best, light_paths) {
+        (Best::Paths, _) | (Best::LightPaths, None) => None,
+        (Best::Cache, _) => Some(Method::IrradianceCache.into()),
+        (Best::LightPaths, Some(choice)) => Some(Plan::with_counts(Method::VertexMerging, choice)),
+    };
+    Ok(Some(Chosen { instead, finding }))
+}
+
+/// The end of the picture by `stop`.
+fn goal(stop: &Stop, threads: usize) -> Goal {
+    let samples = stop.most_samples();
+    Goal { seconds: stop.seconds.map(|seconds| seconds * threads as f64), samples, error: stop.error }
+}
+
+/// Whether a cache could know light of the scene, and its bias would be measured.
+fn may_have_cache(setup: &RenderSetup) -> bool {
+    let Settings { audit, max_depth, .. } = setup.settings;
+    let surfaces = Census::of(setup.scene).surfaces;
+    audit.is_none_or(|share| share > 0.0)
+        && max_depth.is_none_or(|depth| depth > 2)
+        && surfaces.diffuse + surfaces.glossy > 0
+}

@@ -1,0 +1,142 @@
+"""Every method on every scene after the same time, and `auto` against the best of them.
+
+    HALFLIGHT=program python3 tests/peers/methods.py [--budgets 1.5 7.5] [--scenes NAME,...] [--methods NAME,...]
+
+Each method renders 128 x 128 pixels for the seconds of a budget on one thread, one seed after the other. The table
+has relMSE; the regret of `auto` is its error over that of the best other method. References are pictures of
+another seed by a method that suits the scene, kept in the output folder; the noise that they estimate of
+themselves is subtracted. Runs are kept, too: a second call renders those that are missing. Needs numpy, and
+the published scenes in HALFLIGHT_SCENES.
+"""
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from ablation import OWN, ROOT, read_pfm, relmse
+from published import published
+from scene_file import write_scene
+
+OUTPUT = ROOT / "tests" / "output" / "methods"
+PROGRAM = os.environ.get("HALFLIGHT", str(ROOT / "target" / "release" / "halflight"))
+SIZE = (128, 128)
+METHODS = ["path", "irradiance-cache", "sppm", "bdpt", "vcm", "mlt", "instant-radiosity", "photon-map", "auto"]
+HARD = Path(__file__).resolve().parent / "scenes" / "hard"
+
+# Scenes, and the method of their references.
+SCENES = {
+    "cornell-box-bitterli": "path", "cbox-mitsuba": "path", "living-room": "path", "staircase": "path",
+    "sponza-dabrovic": "path", "veach-ajar": "path", "veach-door": "bdpt",
+    "veach-bidir": "bdpt", "lux-causticcube": "vcm", "torus": "sppm", "caustic-glass": "vcm",
+    "water-caustic": "sppm", "two-rooms": "path", "glossy": "path", "caustic": "vcm", "up-light": "bdpt",
+    "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "vcm",
+}
+
+
+def scene_file(name, folder):
+    """The scene `name` as a file that the program reads."""
+    if name in OWN:
+        return OWN[name]
+    if (HARD / f"{name}.toml").exists():
+        return HARD / f"{name}.toml"
+    path = Path(folder) / f"{name}.toml"
+    if not path.exists():
+        write_scene(path, published(name, SIZE))
+    return path
+
+
+def render(scene, flags, threads=1):
+    """The picture and the facts of `--json` of one render."""
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "picture.pfm"
+        command = [PROGRAM, "render", str(scene), "--size", "{}x{}".format(*SIZE), "--json", "-o", str(picture)]
+        done = subprocess.run(command + ["--threads", str(threads)] + flags, capture_output=True, text=True)
+        if done.returncode not in (0, 3):
+            raise RuntimeError(f"{command} {flags}: {done.stderr}")
+        return read_pfm(picture), json.loads(done.stdout)
+
+
+def reference(name, scene, seconds):
+    """A converged picture and the relMSE that is left in it, by its own estimate."""
+    kept = OUTPUT / f"{name}.npz"
+    if not kept.exists():
+        flags = ["--time", f"{seconds}s", "--seed", "1000", "--method", SCENES[name]]
+        picture, facts = render(scene, flags)
+        np.savez(kept, picture=picture, relmse=facts["error"]["relmse"])
+        print(f"# {name}: {facts['method']}, {facts['spp']} spp, relMSE {facts['error']['relmse']:.2e}", flush=True)
+    data = np.load(kept)
+    return data["picture"], float(data["relmse"])
+
+
+def one(job):
+    """Row of the log: a method on a scene for a budget."""
+    name, scene, method, budget, seed, (converged, left) = job
+    flags = ["--time", f"{budget}s", "--seed", str(seed), "--method", method]
+    picture, facts = render(scene, flags)
+    error = max(relmse(picture, converged) - left, 1e-9)
+    return {"scene": name, "method": method, "chosen": facts["method"], "budget": budget, "seed": seed, "spp": facts["spp"],
+            "relmse": error, "mean": float(picture.mean() / converged.mean()), "seconds": facts["seconds"]["render"]}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--budgets", type=float, nargs="+", default=[1.5, 7.5])
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--methods", default=",".join(METHODS))
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--reference-seconds", type=int, default=60)
+    parser.add_argument("--log", default=str(OUTPUT / "runs.jsonl"))
+    parser.add_argument("--jobs", type=int, default=2)
+    a = parser.parse_args()
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    log = Path(a.log)
+    rows = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+    known = {(row["scene"], row["method"], row["budget"], row["seed"]) for row in rows}
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(a.jobs) as pool, open(log, "a") as out:
+        names = a.scenes.split(",")
+        files = {name: scene_file(name, folder) for name in names}
+        converged = dict(zip(names, pool.map(lambda name: reference(name, files[name], a.reference_seconds), names)))
+        jobs = [
+            (name, files[name], method, budget, seed, converged[name])
+            for name in names for budget in a.budgets for seed in range(1, a.seeds + 1)
+            for method in a.methods.split(",") if (name, method, budget, seed) not in known
+        ]
+        for row in pool.map(one, jobs):
+            rows.append(row)
+            out.write(json.dumps(row) + "\n")
+            out.flush()
+    for budget in a.budgets:
+        table([row for row in rows if row["budget"] == budget], budget)
+
+
+def table(rows, budget):
+    """Errors of all methods after `budget` seconds, and the regret of `auto`."""
+    methods = [method for method in METHODS if any(row["method"] == method for row in rows)]
+    print(f"\n{budget:g} s\n\n| scene | " + " | ".join(methods) + " | chosen | regret |")
+    print("|---" * (len(methods) + 3) + "|")
+    regrets = []
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        error = {}
+        for method in methods:
+            logs = [math.log(row["relmse"]) for row in rows if (row["scene"], row["method"]) == (scene, method)]
+            if logs:
+                error[method] = math.exp(sum(logs) / len(logs))
+        others = [value for method, value in error.items() if method != "auto"]
+        best = min(others)
+        cells = [("**{:.1e}**" if error.get(m) == best else "{:.1e}").format(error[m]) if m in error else "–" for m in methods]
+        chosen = {row["chosen"] for row in rows if (row["scene"], row["method"]) == (scene, "auto")}
+        regret = error["auto"] / best if "auto" in error else float("nan")
+        regrets.append(regret)
+        print(f"| {scene} | " + " | ".join(cells) + f" | {', '.join(sorted(chosen))} | {regret:.2f} |")
+    print(f"\nGeometric mean of the regret: {math.exp(sum(map(math.log, regrets)) / len(regrets)):.2f}")
+
+
+if __name__ == "__main__":
+    main()

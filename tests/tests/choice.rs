@@ -1,0 +1,86 @@
+//! Choice of a method where none is given.
+
+use glam::Vec3;
+use halflight::render::{Checkpoint, Method, RenderResult, Settings};
+use halflight_core::Rgb;
+use halflight_core::scene::{Camera, Material};
+use halflight_tests::render::{number, render};
+use halflight_tests::scenes::{SceneBuffers, emitter};
+
+const SIZE: u32 = 96;
+const SPP: u32 = 16;
+
+/// A closed room whose lamp shines at the ceiling alone.
+fn room_with_up_light() -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.1, 0.5, 0.9), Vec3::new(0.6, 0.4, 0.2), Vec3::Y, 70.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let lamp = buffers.material(emitter(0.0, 100.0));
+    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    buffers.square(Vec3::new(0.5, 0.6, 0.5), Vec3::Y, 0.1, lamp);
+    buffers.cuboid(Vec3::new(0.4, 0.5, 0.4), Vec3::new(0.6, 0.59, 0.6), false, wall);
+    buffers
+}
+
+/// A floor under a lamp.
+fn floor() -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.0, 1.0, 2.0), Vec3::ZERO, Vec3::Y, 50.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let grey = buffers.material(Material::GREY);
+    let lamp = buffers.material(emitter(0.0, 10.0));
+    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, grey);
+    buffers.square(Vec3::new(0.0, 1.5, 0.0), Vec3::NEG_Y, 0.5, lamp);
+    buffers
+}
+
+/// A picture whose method is left open; `change` edits the settings last.
+fn chosen(buffers: &SceneBuffers, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(&buffers.scene(), Method::Path, SIZE, SPP, |settings| {
+        (settings.method, settings.audit) = (None, None);
+        change(settings);
+    })
+}
+
+#[test]
+fn a_cache_is_chosen_where_indirect_light_is_most_of_the_noise() {
+    let room = room_with_up_light();
+    let result = chosen(&room, |_| ());
+    assert_eq!(result.method, Method::IrradianceCache);
+    let [path, cache] = ["path", "irradiance_cache"].map(|method| number(&result, "method", method));
+    assert!(path > 2.0 * cache && cache > 0.0, "{path} {cache}");
+    assert!(result.audit.is_some(), "its bias is measured");
+    let audited_by_nobody = chosen(&room, |settings| settings.audit = Some(0.0));
+    assert_eq!(audited_by_nobody.method, Method::Path);
+}
+
+#[test]
+fn paths_are_chosen_where_light_comes_directly_and_have_their_bits() {
+    let floor = floor();
+    let result = chosen(&floor, |_| ());
+    assert_eq!(result.method, Method::Path);
+    let paths = render(&floor.scene(), Method::Path, SIZE, SPP, |_| ());
+    assert!(result.image.pixels == paths.image.pixels);
+}
+
+#[test]
+fn the_choice_follows_from_scene_and_settings_on_any_number_of_threads() {
+    let room = room_with_up_light();
+    let [one, three] = [1, 3].map(|threads| chosen(&room, |settings| settings.threads = Some(threads)));
+    assert_eq!(one.method, three.method);
+    assert!(one.image.pixels == three.image.pixels);
+}
+
+#[test]
+fn a_resumed_film_goes_on_with_the_method_that_was_chosen() {
+    let room = room_with_up_light();
+    let path = std::env::temp_dir().join(format!("halflight-choice-{}", std::process::id()));
+    let keep = Checkpoint { path: path.clone(), every: f64::INFINITY };
+    let whole = chosen(&room, |_| ());
+    let begun = chosen(&room, |settings| {
+        (settings.checkpoint, settings.stop.spp) = (Some(keep), Some(8));
+    });
+    let resumed = chosen(&room, |settings| settings.resume = Some(path.clone()));
+    std::fs::remove_file(path).expect("a film");
+    assert_eq!([begun.method, resumed.method], [whole.method; 2]);
+    assert!(resumed.image.pixels == whole.image.pixels);
+}
