@@ -22,7 +22,7 @@ const PATHS: u32 = 256;
 
 fn main() -> Result<(), OutOfMemory> {
     let mut memory = vec![Line([0; 64]); 256];
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+    let mut arena = Arena::over(&mut memory);
     let scene = room::scene();
     let bvh = Bvh::build(&scene.mesh, &mut arena)?;
     let lights = LightSampler::build(&scene, &mut arena)?;

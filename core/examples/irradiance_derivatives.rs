@@ -25,7 +25,7 @@ fn main() -> Result<(), OutOfMemory> {
 
     let mut memory = [Line([0; 64]); 1024];
     assert!(CellFlux::footprint(N).bytes() <= size_of_val(&memory));
-    let tables = CellFlux::build(N, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))?;
+    let tables = CellFlux::build(N, &mut Arena::over(&mut memory))?;
     let derivatives = tables.derivatives(Level::detect(), &hemisphere).expect("tables of N strata");
     println!("irradiance {:.3} W/m²", derivatives.luminance());
     println!("gradient {:.4} W/m³", derivatives.luminance_gradient());

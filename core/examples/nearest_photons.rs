@@ -16,7 +16,7 @@ fn main() -> Result<(), OutOfMemory> {
     let mut memory = vec![Line([0; 64]); LINES];
     let needed: Footprint = Photons::footprint(PHOTONS).and(Neighbours::footprint(NEAREST));
     assert!(needed.bytes() <= LINES * 64, "{} lines", needed.bytes() / 64);
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+    let mut arena = Arena::over(&mut memory);
 
     let mut photons = Photons::new(PHOTONS, &mut arena)?;
     for (i, photon) in photons.as_mut_slice().iter_mut().enumerate() {

@@ -38,7 +38,7 @@ pub fn render(
     pixels: &mut [Rgb; SIZE * SIZE],
 ) -> Result<(), OutOfMemory> {
     let (scene, size) = (room::scene(), SIZE as u32);
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(memory));
+    let mut arena = Arena::over(memory);
     let bvh = Bvh::build(&scene.mesh, &mut arena)?;
     let lights = LightSampler::build(&scene, &mut arena)?;
     let mut state = RenderState::new(size, size, Shard::WHOLE, &mut arena)?;

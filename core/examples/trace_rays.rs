@@ -36,7 +36,7 @@ fn main() -> Result<(), OutOfMemory> {
     // The memory of the build is known beforehand.
     let mut memory = [Line([0; 64]); 64];
     assert!(Bvh::footprint(triangles.len()).bytes() <= size_of_val(&memory));
-    let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))?;
+    let bvh = Bvh::build(&scene.mesh, &mut Arena::over(&mut memory))?;
 
     let level = Level::detect();
     let pixel = |i: usize| (i as u32 % SIZE, i as u32 / SIZE);

@@ -50,7 +50,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     }
 
     let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes().div_ceil(64)];
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let mut arena = Arena::over(&mut lines);
     let bvh = Bvh::build(&mesh, &mut arena).expect("the footprint was granted");
     for level in Level::detect().and_below() {
         trace(&bvh, &mesh, level, &rays, &expected);

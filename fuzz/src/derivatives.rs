@@ -133,7 +133,7 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
     let hemisphere = Hemisphere::new(n, &radiance, &inverse, &directions).expect("n² of each");
     let hemisphere = hemisphere.with_normals(&normals).expect("n² of each");
     let mut lines = vec![Line([0; 64]); CellFlux::footprint(n).bytes() / 64];
-    let tables = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+    let tables = CellFlux::build(n, &mut Arena::over(&mut lines));
     let tables = tables.expect("the footprint is enough");
 
     let of = |level| {

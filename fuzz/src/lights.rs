@@ -44,7 +44,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
 
     let bytes = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes();
     let mut lines = vec![Line([0; 64]); bytes / 64];
-    let built = LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+    let built = LightSampler::build(&scene, &mut Arena::over(&mut lines));
     let lights = built.expect("the footprint is what the build takes");
     for _ in 0..MAX_POINTS {
         if input.is_empty() {

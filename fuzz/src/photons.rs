@@ -34,8 +34,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     photons.truncate(MAX_PHOTONS);
 
     let mut memory = lines(Photons::footprint(photons.len()));
-    let mut place = Photons::new(photons.len(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))
-        .expect("the footprint was granted");
+    let mut place =
+        Photons::new(photons.len(), &mut Arena::over(&mut memory)).expect("the footprint was granted");
     place.as_mut_slice().copy_from_slice(&photons);
     let map = place.build(photons.len());
     let finite = photons.iter().filter(|photon| photon.position().is_finite()).count();
@@ -82,8 +82,8 @@ fn expected(map: &PhotonMap, place: Vec3, radius: f32) -> Vec<u32> {
 
 fn search(map: &PhotonMap, level: Level, asked: &[Vec3], orders: &[Vec<u32>], radius: f32, k: usize) {
     let mut memory = lines(Neighbours::footprint(k));
-    let mut neighbours = Neighbours::new(k, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))
-        .expect("the footprint was granted");
+    let mut neighbours =
+        Neighbours::new(k, &mut Arena::over(&mut memory)).expect("the footprint was granted");
     let sorted = |mut indices: Vec<u32>| {
         indices.sort_unstable();
         indices

@@ -18,7 +18,7 @@ pub fn run(data: &[u8]) {
 
 fn attempt(input: &mut Unstructured) -> Result<()> {
     let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(MAX_RECORDS).bytes() / 64];
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let mut arena = Arena::over(&mut lines);
     let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     let mut cache =
         IrradianceCache::new(&bounds, MAX_RECORDS, &mut arena).expect("the footprint was granted");

@@ -75,7 +75,7 @@ pub(crate) fn lines(footprint: Footprint) -> Vec<Line> {
 
 /// An arena over `lines`.
 pub(crate) fn arena(lines: &mut [Line]) -> Arena<'_> {
-    Arena::new(bytemuck::cast_slice_mut(lines))
+    Arena::over(lines)
 }
 
 /// A point in the room or near it, on a coarse grid.

@@ -44,7 +44,7 @@ fn warps(u: [f32; 2], cone: f32) {
 
 fn alias_table(weights: &[f32], u: f32) {
     let mut lines = lines(AliasTable::footprint(weights.len()).bytes());
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let mut arena = Arena::over(&mut lines);
     let table =
         AliasTable::build(weights.len(), |i| weights[i], &mut arena).expect("the footprint was granted");
     let Some((item, pdf, rest)) = table.sample(u) else {
@@ -61,7 +61,7 @@ fn alias_table(weights: &[f32], u: f32) {
 
 fn distribution(width: usize, height: usize, weights: &[f32], u: [f32; 2]) {
     let mut lines = lines(Distribution2d::footprint(width, height).bytes());
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let mut arena = Arena::over(&mut lines);
     let weight = |x: usize, y: usize| weights[y * width + x];
     let table = Distribution2d::build(width, height, weight, &mut arena).expect("the footprint was granted");
     let Some(cell) = table.sample(u) else {

@@ -2,6 +2,7 @@
 //! allocates.
 
 use crate::report::quantity::readable_bytes;
+use halflight_core::memory::{ALIGNMENT, Footprint, Line, OutOfMemory};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -76,6 +77,19 @@ impl core::fmt::Display for Shortage {
 }
 
 impl core::error::Error for Shortage {}
+
+/// Zeroed lines of `footprint` bytes.
+///
+/// # Errors
+/// [`OutOfMemory`] if the system refuses them.
+pub(crate) fn lines(footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
+    let needed = footprint.bytes();
+    let count = needed.div_ceil(ALIGNMENT);
+    let mut lines = Vec::new();
+    lines.try_reserve_exact(count).map_err(|_| OutOfMemory { needed, available: 0 })?;
+    lines.resize(count, Line([0; ALIGNMENT]));
+    Ok(lines)
+}
 
 /// Reads a file of at most `most` bytes.
 ///

@@ -74,8 +74,7 @@ fn sheet(n: usize) -> Soup {
 fn agrees(soup: &Soup, rays: &[Ray]) {
     let mesh = soup.mesh();
     let mut memory = lines(Bvh::footprint(mesh.triangles.len()).bytes());
-    let bvh =
-        Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).expect("exact footprint");
+    let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory)).expect("exact footprint");
     let truth: Vec<Hit> = rays.iter().map(|ray| brute::nearest(&mesh, ray)).collect();
     for level in Level::detect().and_below() {
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
@@ -257,7 +256,7 @@ fn every_level_builds_the_same_tree() {
     let bytes = Bvh::footprint(3000).bytes();
     let build = |level: Level| {
         let mut memory = lines(bytes);
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+        let mut arena = Arena::over(&mut memory);
         let bvh = Bvh::build_with(&soup.mesh(), &mut arena, level, &Serial).expect("exact footprint");
         (bytemuck::cast_slice(bvh.nodes).to_vec() as std::vec::Vec<u8>, bvh.triangles.to_vec())
     };
@@ -271,7 +270,7 @@ fn every_level_builds_the_same_tree() {
 fn a_copy_takes_exactly_what_it_says() {
     let soup = random_soup(500, 1.0, Vec3::ZERO);
     let mut memory = lines(Bvh::footprint(500).bytes());
-    let bvh = Bvh::build(&soup.mesh(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).expect("fits");
+    let bvh = Bvh::build(&soup.mesh(), &mut Arena::over(&mut memory)).expect("fits");
     let bytes = bvh.used().bytes();
     let mut copy = lines(bytes);
     let copy: &mut [u8] = bytemuck::cast_slice_mut(&mut copy);
@@ -293,7 +292,7 @@ fn what_a_survey_is_sure_of_rays_find() {
     for soup in [random_soup(300, 3.0, Vec3::ZERO), random_soup(30, 9.0, Vec3::splat(50.0)), sheet(40)] {
         let mesh = soup.mesh();
         let mut memory = lines(Bvh::footprint(mesh.triangles.len()).bytes());
-        let bvh = Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory)).unwrap();
         for _ in 0..3000 {
             let [a, b, c] = mesh.corners(random.bits() % mesh.triangles.len() as u32);
             let (u, v) = (0.5 * random.unit(), 0.5 * random.unit());
@@ -345,7 +344,7 @@ fn on_a_floor_of_many_triangles_a_survey_sees_it_all_but_at_the_edge_and_under_a
     let wall = [at(2, 0), at(2, 0) + Vec3::Y, at(2, 8)];
     let soup = Soup::of(squares.chain([wall]));
     let mut memory = lines(Bvh::footprint(soup.triangles.len()).bytes());
-    let bvh = Bvh::build(&soup.mesh(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    let bvh = Bvh::build(&soup.mesh(), &mut Arena::over(&mut memory)).unwrap();
     let frame = Frame { tangent: Vec3::X, bitangent: Vec3::NEG_Z, normal: Vec3::Y };
     let points = [[0.9, -0.9, 0.9, -0.9, 0.9, -0.9, 0.9, -0.9], [0.8; POINTS]];
     let look = |x: f32| {

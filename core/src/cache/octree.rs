@@ -349,7 +349,7 @@ mod tests {
     fn with_tree(boxes: &[(Vec3, Vec3)], capacity: usize, nodes: usize, check: impl Fn(&Octree)) {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 0.9, 0.5) };
         let mut lines = vec![Line([0xff; 64]); Octree::footprint(capacity).bytes() / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         let mut tree = Octree::new(&bounds, capacity, &mut arena).unwrap();
         assert_eq!(arena.available(), 0);
         let nodes = nodes.min(tree.nodes.len());
@@ -408,8 +408,7 @@ mod tests {
         with_tree(&[], 0, usize::MAX, |tree| tree.at(Vec3::splat(0.3), |_| panic!("nothing is there")));
         let mut lines = vec![Line([0; 64]); Octree::footprint(1).bytes() / 64];
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ZERO };
-        let mut tree =
-            Octree::new(&bounds, 1, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        let mut tree = Octree::new(&bounds, 1, &mut Arena::over(&mut lines)).unwrap();
         tree.insert(0, Vec3::ZERO, Vec3::NAN, 0);
         let mut found = 0;
         tree.at(Vec3::NAN, |_| {

@@ -34,7 +34,7 @@ impl core::error::Error for OutOfMemory {}
 /// ```
 /// use halflight_core::memory::{Arena, Line};
 /// let mut lines = [Line([0; 64]); 4];
-/// let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+/// let mut arena = Arena::over(&mut lines);
 /// let numbers: &mut [u32] = arena.slice(16)?;
 /// assert_eq!((numbers.len(), arena.available()), (16, 192));
 /// # Ok::<(), halflight_core::memory::OutOfMemory>(())
@@ -49,6 +49,11 @@ impl<'m> Arena<'m> {
     pub fn new(bytes: &'m mut [u8]) -> Self {
         let skip = bytes.as_ptr().align_offset(ALIGNMENT).min(bytes.len());
         Self { rest: &mut bytes[skip..] }
+    }
+
+    /// Arena over `lines`, of which it wastes no byte.
+    pub fn over(lines: &'m mut [Line]) -> Self {
+        Self::new(bytemuck::cast_slice_mut(lines))
     }
 
     /// Bytes not handed out yet.
@@ -106,7 +111,7 @@ mod tests {
     #[test]
     fn a_failed_request_takes_nothing() {
         let mut lines = [Line([0; 64]); 2];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         assert!(arena.slice::<u64>(usize::MAX).is_err());
         assert!(arena.slice::<u8>(129).is_err());
         assert_eq!(arena.available(), 128);

@@ -56,10 +56,10 @@ pub(super) fn with_box<T>(materials: [Material; 4], work: impl FnOnce(&RenderCon
     let scene = Scene { mesh, materials: &materials, textures: &[], lights: &[], environment: None, camera };
 
     let mut bvh = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
-    let bvh = Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh))).unwrap();
+    let bvh = Bvh::build(&mesh, &mut Arena::over(&mut bvh)).unwrap();
     let footprint = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene));
     let mut lights = vec![Line([0; 64]); footprint.bytes() / 64];
-    let lights = LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights))).unwrap();
+    let lights = LightSampler::build(&scene, &mut Arena::over(&mut lights)).unwrap();
     let settings = PathSettings { width: SIDE, height: SIDE, seed: 1, max_depth: UNLIMITED };
     work(&RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level: Level::detect() })
 }

@@ -162,7 +162,7 @@ mod tests {
     /// `most` questions.
     fn round(target: u32, most: u32, work: impl FnOnce(&mut Round<Loop>)) {
         let mut lines = vec![Line([0; 64]); RenderState::footprint(40, 40).bytes() / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         let mut state = RenderState::new(40, 40, Shard::WHOLE, &mut arena).unwrap();
         let asked = AtomicU32::new(0);
         let is_over = || asked.fetch_add(1, Ordering::Relaxed) >= most;

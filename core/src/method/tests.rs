@@ -59,9 +59,9 @@ pub(super) fn with_room(check: impl FnOnce(&RenderContext)) {
         camera: Camera::look_at(Vec3::new(0.0, 1.5, 6.5), Vec3::new(0.0, 1.4, 0.0), Vec3::Y, 40.0),
     };
     let mut bvh = lines(Bvh::footprint(triangles.len()).bytes());
-    let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh))).unwrap();
+    let bvh = Bvh::build(&scene.mesh, &mut Arena::over(&mut bvh)).unwrap();
     let mut lights = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
-    let lights = LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights))).unwrap();
+    let lights = LightSampler::build(&scene, &mut Arena::over(&mut lights)).unwrap();
     let settings = PathSettings { width: 20, height: 20, seed: 1, max_depth: 8 };
     check(&RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level: Level::BASELINE });
 }
@@ -75,7 +75,7 @@ pub(super) fn film(
 ) -> Result<Vec<Pixel>, OutOfMemory> {
     let PathSettings { width, height, .. } = context.settings;
     let mut memory = lines(RenderState::footprint(width, height).bytes());
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+    let mut arena = Arena::over(&mut memory);
     let mut state = RenderState::new(width, height, Shard::WHOLE, &mut arena)?;
     let mut target = 0;
     while state.spp() < spp {
@@ -219,8 +219,7 @@ fn environment_visibility_is_learned_in_rooms_that_see_little_of_it() {
         let environment = Some(Environment { radiance: Rgb::ONE, map: None, to_map: Mat3::IDENTITY });
         let scene = Scene { environment, lights: &[], ..*context.scene };
         let mut memory = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
-        let lights =
-            LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let lights = LightSampler::build(&scene, &mut Arena::over(&mut memory)).unwrap();
         let context = RenderContext { scene: &scene, lights: &lights, ..*context };
         let learn = |bytes: usize, most: u32| {
             let (mut memory, mut scratch) =

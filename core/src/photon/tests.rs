@@ -38,7 +38,7 @@ pub(super) fn with_map(places: &[Vec3], check: impl FnOnce(&PhotonMap)) {
 /// Builds over `photons` and checks the map.
 pub(crate) fn with_map_of(photons: &[Photon], check: impl FnOnce(&PhotonMap)) {
     let mut memory = lines(Photons::footprint(photons.len()));
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+    let mut arena = Arena::over(&mut memory);
     let mut room = Photons::new(photons.len(), &mut arena).unwrap();
     room.as_mut_slice().copy_from_slice(photons);
     check(&room.build(photons.len()));
@@ -56,7 +56,7 @@ fn check_searches(map: &PhotonMap, place: Vec3, radius: f32) {
     for level in Level::detect().and_below() {
         for k in [0, 1, 8, 50, 200] {
             let mut memory = lines(Neighbours::footprint(k));
-            let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+            let mut arena = Arena::over(&mut memory);
             let mut neighbours = Neighbours::new(k, &mut arena).unwrap();
             map.nearest(level, place, radius, &mut neighbours);
             let expected = expected(map, place, radius, k);
@@ -153,7 +153,7 @@ fn photons_come_back_as_they_were_put() {
     let mut random = Random(11);
     let places: Vec<_> = (0..1000).map(|_| random.point() * 1e-3 - 5e-4).collect();
     let mut memory = lines(Photons::footprint(1000));
-    let mut photons = Photons::new(1000, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    let mut photons = Photons::new(1000, &mut Arena::over(&mut memory)).unwrap();
     let put: Vec<_> = places
         .iter()
         .map(|&place| Photon::new(place, random.point() - 0.5, random.point() - 0.5, random.point()))
@@ -215,8 +215,7 @@ fn a_million_photons_on_a_wall_or_in_one_place_are_searched_like_any_others() {
 fn with_light(places: &[Vec3], check: impl FnOnce(&PhotonMap)) {
     let mut random = Random(21);
     let mut memory = lines(Photons::footprint(places.len()));
-    let mut photons =
-        Photons::new(places.len(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    let mut photons = Photons::new(places.len(), &mut Arena::over(&mut memory)).unwrap();
     for (photon, &place) in photons.as_mut_slice().iter_mut().zip(places) {
         let normal = Vec3::new(0.2, 0.2, 1.0) + random.point() - 0.5;
         *photon = Photon::new(place, random.point() - Vec3::new(0.5, 0.5, 0.2), normal, random.point());
@@ -321,7 +320,7 @@ fn nothing_leaks_through_a_thin_wall_or_around_an_edge() {
     // Light on one side of a wall of thickness 1e-3, and on a floor that meets the wall.
     let mut random = Random(41);
     let mut memory = lines(Photons::footprint(40_000));
-    let mut photons = Photons::new(40_000, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    let mut photons = Photons::new(40_000, &mut Arena::over(&mut memory)).unwrap();
     for (i, photon) in photons.as_mut_slice().iter_mut().enumerate() {
         let (a, b) = (random.unit() - 0.5, random.unit());
         *photon = match i % 2 {
@@ -362,9 +361,8 @@ fn batches_find_what_single_searches_find() {
                 [(1, f32::INFINITY), (8, f32::INFINITY), (60, f32::INFINITY), (60, 0.05 * extent)]
             {
                 let mut memory = [lines(Neighbours::footprint(k)), lines(Neighbours::footprint(k))];
-                let [mut one, mut many] = memory.each_mut().map(|memory| {
-                    Neighbours::new(k, &mut Arena::new(bytemuck::cast_slice_mut(memory))).unwrap()
-                });
+                let [mut one, mut many] =
+                    memory.each_mut().map(|memory| Neighbours::new(k, &mut Arena::over(memory)).unwrap());
                 let mut seen = vec![false; asked.len()];
                 let mut order = vec![QueryOrder::default(); asked.len()];
                 map.nearest_batch(level, &asked, radius, &mut order, &mut many, |i, found| {
@@ -417,8 +415,7 @@ fn the_map_is_the_same_on_any_number_of_threads() {
     let places: Vec<_> = (0..50_000).map(|_| random.point().with_x(0.0)).collect();
     let build = |join: bool| {
         let mut memory = lines(Photons::footprint(places.len()));
-        let mut photons =
-            Photons::new(places.len(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let mut photons = Photons::new(places.len(), &mut Arena::over(&mut memory)).unwrap();
         for (photon, &place) in photons.as_mut_slice().iter_mut().zip(&places) {
             *photon = Photon::new(place, Vec3::Z, Vec3::Z, Rgb::ONE);
         }

@@ -215,7 +215,7 @@ mod tests {
         let (width, height) = (13, 7);
         let bytes = Distribution2d::footprint(width, height).bytes();
         let mut lines = std::vec![Line([0; 64]); bytes / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         // A row of zeros, and cells of zero in the other rows.
         let weight = |x: usize, y: usize| if y == 3 { 0.0 } else { (x * y % 5) as f32 };
         let distribution =

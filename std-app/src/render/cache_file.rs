@@ -270,7 +270,7 @@ mod tests {
         let footprint = IrradianceCache::footprint(10_000).bytes();
         let mut lines = [0, 1].map(|_| vec![Line([0; 64]); footprint / 64]);
         let mut caches = lines.iter_mut().zip(&records).map(|(lines, records)| {
-            let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
+            let mut arena = Arena::over(lines);
             let mut cache = IrradianceCache::new(&bounds, 10_000, &mut arena).unwrap();
             cache.restore(records);
             cache

@@ -1,9 +1,14 @@
-//! Error of a picture: noise, plus bias by an audit or by photon blur.
+//! Error of a picture: noise from its half-films, plus bias by an audit or by photon blur.
 
 use super::audit::{Audit, Audited};
+use super::regions;
 use super::workers::Workers;
-use super::{ErrorEstimate, NoiseAndBlur};
+use halflight_core::estimate::{
+    BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
+};
+use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::method::RenderState;
+use rayon::prelude::*;
 
 /// Error of a picture in its parts.
 pub(super) struct ErrorReport {
@@ -53,5 +58,73 @@ impl ErrorReport {
     pub(super) fn error(&self) -> Option<ErrorEstimate> {
         let audited = self.audited.as_ref().map(|audited| audited.total);
         audited.or(self.noise_and_blur.map(|noise_and_blur| noise_and_blur.total)).or(self.noise)
+    }
+}
+
+/// Noise and blur of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseAndBlur {
+    /// Noise of the picture, from its half-films.
+    pub noise: ErrorEstimate,
+    /// Squared bias by photon blur, estimated from the samples.
+    pub blur: BiasEstimate,
+    /// Sum of both.
+    pub total: ErrorEstimate,
+}
+
+impl NoiseAndBlur {
+    /// Error of `film` with known noise; `None` without blur.
+    pub(super) fn of(workers: &Workers, film: &Film, noise: Option<ErrorEstimate>) -> Option<Self> {
+        let (noise, blur) = noise.zip(workers.blur(film))?;
+        Some(Self { noise, blur, total: noise.with_bias(blur) })
+    }
+}
+
+impl Workers<'_> {
+    /// Error of `film`; `None` with fewer than four samples or for a black picture.
+    pub(super) fn estimate(&self, film: &Film, shares: bool) -> Option<ErrorEstimate> {
+        regions::estimate(&self.errors(film)?, film.width(), shares)
+    }
+
+    /// Error sums of the tiles of `film`; `None` for a black picture.
+    fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
+        let mean = self.mean(film)?;
+        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
+        let tile = |index: usize| Tile::new(film.width(), film.height(), index);
+        let learn = |mut known: BrightnessClasses, (index, pixels): (usize, &[Pixel])| {
+            known.add(tile(index), pixels, mean);
+            known
+        };
+        let both = |mut one: BrightnessClasses, other: BrightnessClasses| {
+            one += &other;
+            one
+        };
+        let count = tiles.len();
+        Some(self.install(|| {
+            let asked =
+                tiles.clone().enumerate().filter(|(tile, _)| BrightnessClasses::uses_tile(*tile, count));
+            let alike =
+                asked.fold(BrightnessClasses::default, learn).reduce(BrightnessClasses::default, both);
+            let shrinkage = alike.shrinkage();
+            let error = |(index, pixels)| TileError::of(tile(index), pixels, mean, &shrinkage);
+            tiles.enumerate().map(error).collect()
+        }))
+    }
+
+    /// Bias of `film` by photon blur; `None` without photons.
+    pub(super) fn blur(&self, film: &Film) -> Option<BiasEstimate> {
+        let mean = self.mean(film)?;
+        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
+        let tiles: Vec<_> = self.install(|| tiles.map(|tile| TileBlur::of(tile, mean)).collect());
+        BiasEstimate::of_blur(tiles.into_iter())
+    }
+
+    /// Mean radiance of `film`; `None` if black.
+    pub(super) fn mean(&self, film: &Film) -> Option<f64> {
+        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
+        let mut light = TileLight::default();
+        let sums: Vec<_> = self.install(|| tiles.map(TileLight::of).collect());
+        sums.into_iter().for_each(|tile| light += tile);
+        Some(light.mean()).filter(|mean| *mean > 0.0)
     }
 }

@@ -1,12 +1,14 @@
 //! Filling of pixels without samples in a picture that ended early: each gets the mean of its surroundings.
 //! If there is no sample at all, some pixels are path traced first for a short time.
 
+use super::threads::{End, Threads};
 use super::workers::Workers;
 use crate::save::Image;
 use core::time::Duration;
 use halflight_core::bsdf::Features;
 use halflight_core::film::Pixel;
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::Line;
+use halflight_core::method::Executor;
 use halflight_core::transport::PathIntegrator;
 use std::time::Instant;
 
@@ -31,6 +33,7 @@ pub(super) fn sketch<F: Features>(
     let end = Instant::now() + SKETCH_TIME;
     let count = PathIntegrator::<F>::scratch(WAVE).bytes().div_ceil(size_of::<Line>());
     let mut scratch = vec![vec![Line([0; 64]); count]; workers.count()];
+    let mut executor = Threads::new(workers, &mut scratch).until(End::Sketch(end));
     let mut all = Vec::new();
     let mut step = size[0].max(size[1]).next_power_of_two();
     while step > 0 && Instant::now() < end {
@@ -43,11 +46,11 @@ pub(super) fn sketch<F: Features>(
         let places: Vec<[u32; 2]> = places.map(|[x, y]| [middle(x, size[0]), middle(y, size[1])]).collect();
         for places in places.chunks(WAVE * workers.count()) {
             let mut found = vec![Pixel::default(); places.len()];
-            let task = |task: usize, arena: &mut Arena, out: &mut [Pixel]| {
-                tracer.sample_pixels(&places[task * WAVE..][..out.len()], 0..1, WAVE, arena, out)
-            };
-            let done = workers.pass(&mut found, WAVE, &mut scratch, &|| Instant::now() >= end, &task);
-            if !done.is_ok_and(|(_, all)| all) {
+            let pieces = places.chunks(WAVE).zip(found.chunks_mut(WAVE));
+            let passed = executor.pass(pieces, |_, (places, out), worker| {
+                tracer.sample_pixels(places, 0..1, WAVE, &mut worker.scratch, out)
+            });
+            if !passed.is_ok_and(|passed| passed.is_complete) {
                 return all;
             }
             all.extend(places.iter().zip(&found).map(|(place, pixel)| (*place, pixel.mean().to_array())));

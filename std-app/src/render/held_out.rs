@@ -62,7 +62,7 @@ pub(super) fn held_out<F: Features>(
     let places: Vec<_> = places.map(|(i, place)| (place, pixel(i))).collect();
 
     let mut tables = vec![Line([0; 64]); CellFlux::footprint(EXACT).bytes() / 64];
-    let flux = CellFlux::build(EXACT, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables)))?;
+    let flux = CellFlux::build(EXACT, &mut Arena::over(&mut tables))?;
     let gathering =
         Gathering { flux: &flux, metric: metric::Settings::new(Metric::MinDistance, 1.0), least_pixels: 0.0 };
     // Mean and variance of the mean.

@@ -3,9 +3,9 @@
 
 use super::{RenderError, Settings};
 use crate::compare::working_bytes;
-use crate::memory::Budget;
+use crate::memory::{self, Budget};
 use crate::pages::Pages;
-use halflight_core::memory::{ALIGNMENT, Arena, Footprint, Line, MemorySource, OutOfMemory};
+use halflight_core::memory::{Arena, Footprint, Line, MemorySource, OutOfMemory};
 use halflight_core::scene::{Scene, Texels};
 
 /// Bytes of one structure.
@@ -72,10 +72,7 @@ impl<'m> Memory<'m> {
 
     fn lines(&mut self, structure: &'static str, footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
         let needed = self.needed(footprint)?;
-        let count = footprint.bytes().div_ceil(ALIGNMENT);
-        let mut lines = Vec::new();
-        lines.try_reserve_exact(count).map_err(|_| self.refusal(needed))?;
-        lines.resize(count, Line([0; ALIGNMENT]));
+        let lines = memory::lines(footprint).map_err(|_| self.refusal(needed))?;
         self.count(structure, footprint);
         Ok(lines)
     }
@@ -173,7 +170,7 @@ impl<'m> MemorySource<'m> for Memory<'m> {
 
     fn take(&mut self, structure: &'static str, footprint: Footprint) -> Result<Arena<'m>, OutOfMemory> {
         let lines = self.bank.alloc(self.lines(structure, footprint)?);
-        Ok(Arena::new(bytemuck::cast_slice_mut(lines)))
+        Ok(Arena::over(lines))
     }
 
     fn lend<T>(
@@ -183,7 +180,7 @@ impl<'m> MemorySource<'m> for Memory<'m> {
         work: impl FnOnce(&mut Self, &mut Arena) -> Result<T, OutOfMemory>,
     ) -> Result<T, OutOfMemory> {
         let mut lines = self.lines(structure, footprint)?;
-        let done = work(self, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+        let done = work(self, &mut Arena::over(&mut lines));
         if let Some(other) = self.uses.iter_mut().find(|other| other.structure == structure) {
             other.bytes = other.bytes.saturating_sub(footprint.bytes());
         }

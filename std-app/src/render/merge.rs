@@ -3,16 +3,15 @@
 use super::ErrorEstimate;
 use super::audit::{self, Audited};
 use super::error::{FileError, RenderError};
-use super::error_report::ErrorReport;
+use super::error_report::{ErrorReport, NoiseAndBlur};
 use super::film_file::Reader;
 use super::method::Method;
-use super::noise_and_blur::NoiseAndBlur;
 use super::picture::image;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
 use super::workers::Workers;
-use crate::memory::Budget;
+use crate::memory::{Budget, lines};
 use crate::save::Image;
-use halflight_core::memory::{ALIGNMENT, Arena, Line};
+use halflight_core::memory::Arena;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::transport::Counters;
 use std::path::PathBuf;
@@ -64,17 +63,15 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let [width, height] = first.header.size();
     let spp = first.header.spp;
     let is_biased = first.header.method().is_some_and(Method::is_biased);
-    let mut lines = Vec::new();
-    let needed = RenderState::footprint(width, height).bytes();
+    let footprint = RenderState::footprint(width, height);
     // The picture, and the data of its error estimate.
     let beside = 64 * width as usize * height as usize;
-    if needed.saturating_add(beside) > most {
-        return Err(RenderError::Memory { needed: needed.saturating_add(beside), available: most });
+    let needed = footprint.bytes().saturating_add(beside);
+    if needed > most {
+        return Err(RenderError::Memory { needed, available: most });
     }
-    let count = needed.div_ceil(ALIGNMENT);
-    lines.try_reserve_exact(count).map_err(|_| RenderError::Memory { needed, available: 0 })?;
-    lines.resize(count, Line([0; ALIGNMENT]));
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let mut lines = lines(footprint)?;
+    let mut arena = Arena::over(&mut lines);
     let mut state = RenderState::new(width, height, Shard::WHOLE, &mut arena)?;
     state.is_correlated = first.header.shares;
     let mut seconds = 0.0;

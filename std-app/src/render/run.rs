@@ -99,15 +99,14 @@ impl WithFeatures for Render<'_> {
         memory.set_aside("picture", picture.slice::<u32>(pixels))?;
         let mut lights_lines =
             memory.take("lights", LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
-        let lights =
-            LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
+        let lights = LightSampler::build(scene, &mut Arena::over(&mut lights_lines))?;
         let lights = lights.with_level(settings.level);
         let build = build_start.elapsed().as_secs_f64();
 
         let clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
         let left = settings.stop.seconds.map(|limit| limit - clock.seconds());
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
-        let mut film_arena = Arena::new(bytemuck::cast_slice_mut(&mut film_lines));
+        let mut film_arena = Arena::over(&mut film_lines);
         let state = RenderState::new(width, height, settings.shard, &mut film_arena)?;
         let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
@@ -169,10 +168,10 @@ pub(super) fn build_bvh<'m>(
     lines: &'m mut Pages,
 ) -> Result<Bvh<'m>, RenderError> {
     let mut working = memory.take_pages("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut working));
+    let mut arena = Arena::over(&mut working);
     let built = workers.build_bvh(&scene.mesh, level, &mut arena)?;
     *lines = memory.take_pages("bvh", built.used())?;
-    let bvh = built.copied(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
+    let bvh = built.copied(&mut Arena::over(lines))?;
     memory.give_back("bvh build");
     Ok(bvh)
 }

@@ -12,7 +12,7 @@ use crate::pages::Pages;
 use halflight_core::bsdf::{All, Features};
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::light::LightSampler;
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::Arena;
 use halflight_core::method::irradiance_cache::LEAST_PIXELS;
 use halflight_core::method::record_placement::{CacheBuilder, RecordPlacement, step_footprint, step_points};
 use halflight_core::scene::Scene;
@@ -99,7 +99,8 @@ impl Study<'_> {
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut lights_lines =
             memory.take("lights", LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
-        let lights = LightSampler::build(scene, &mut arena(&mut lights_lines))?.with_level(settings.level);
+        let lights =
+            LightSampler::build(scene, &mut Arena::over(&mut lights_lines))?.with_level(settings.level);
         let tracer = PathIntegrator::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let strata = settings.cache.strata() as usize;
         let scratch =
@@ -112,7 +113,7 @@ impl Study<'_> {
         let points = held_out(&tracer, size, [study.points, REPEATS], &mut executor)?;
         let points = points.unwrap_or_default();
         let mut tables = memory.take("gathering", CellFlux::footprint(strata).and(step_footprint()))?;
-        let mut tables = arena(&mut tables);
+        let mut tables = Arena::over(&mut tables);
         let flux = CellFlux::build(strata, &mut tables)?;
         let step = step_points(&mut tables)?;
         let capacity = (study.records as usize).saturating_mul(4);
@@ -121,7 +122,8 @@ impl Study<'_> {
             let usual = metric::Settings::new(metric, extent);
             let mut search = Search::new(study.records, usual.error);
             loop {
-                let mut builder = CacheBuilder::new(&bvh.bounds(), capacity, 0, &mut arena(&mut lines))?;
+                let mut builder =
+                    CacheBuilder::new(&bvh.bounds(), capacity, 0, &mut Arena::over(&mut lines))?;
                 for pass in (0..if study.progressive { PASSES } else { 1 }).rev() {
                     // Radii are proportional to the error or to its fourth root.
                     let wider = 2f32.powi(pass);
@@ -150,10 +152,6 @@ impl Study<'_> {
         }
         Ok(())
     }
-}
-
-fn arena(lines: &mut [Line]) -> Arena<'_> {
-    Arena::new(bytemuck::cast_slice_mut(lines))
 }
 
 /// Compares a cache with the exact values.

@@ -21,6 +21,8 @@ pub(super) enum End {
     FirstSamples(Option<Instant>, Instant),
     /// Every other round: at its deadline and when the user interrupts.
     Round(Option<Instant>),
+    /// A sketch after the end of the render: at a time.
+    Sketch(Instant),
 }
 
 impl End {
@@ -33,6 +35,7 @@ impl End {
                 render.is_late() || is_past(deadline) || render.ends_samples_since(start)
             }
             End::Round(deadline) => render.is_interrupted() || is_past(deadline),
+            End::Sketch(end) => is_past(Some(end)),
         }
     }
 
@@ -40,6 +43,7 @@ impl End {
         match self {
             End::Prepass => None,
             End::FirstRound(deadline) | End::FirstSamples(deadline, _) | End::Round(deadline) => deadline,
+            End::Sketch(end) => Some(end),
         }
     }
 }
@@ -268,7 +272,7 @@ mod tests {
         let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
         let (count, piece) = (1 << 15, 1 << 10);
         let mut lines = vec![Line([0; 64]); PhotonMapStore::footprint(count).bytes() / 64];
-        let mut store = PhotonMapStore::over(Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+        let mut store = PhotonMapStore::over(Arena::over(&mut lines));
         for interrupted_by in [None, Some(count / piece - 1)] {
             let passed = store.fill(&mut executor, (count, piece), |number, _, photons| {
                 photons.fill(Photon::new(Vec3::splat(number as f32), Vec3::Z, Vec3::Z, Rgb::ONE));

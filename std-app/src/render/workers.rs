@@ -1,23 +1,14 @@
 //! Thread pool: each thread takes the next task when it is free, and has its own working memory.
 
+use super::RenderError;
 use super::deadline::Deadline;
-use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bvh::{Bvh, ForkJoin};
-use halflight_core::estimate::{
-    BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
-};
-use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Mesh;
-use halflight_core::transport::Counters;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
-
-/// Task of a pass: its number, working memory, and part of the output.
-pub(super) type Task<'t, T> =
-    dyn Fn(usize, &mut Arena, &mut [T]) -> Result<Counters, OutOfMemory> + Sync + 't;
 
 /// A pool of threads.
 pub(super) struct Workers<'w> {
@@ -63,6 +54,11 @@ impl<'w> Workers<'w> {
         self.fork.0.current_num_threads()
     }
 
+    /// Runs `work` on the pool, whose threads take the parts of its parallel iterators.
+    pub(super) fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.fork.0.install(work)
+    }
+
     /// Builds the BVH of `mesh` on all threads.
     pub(super) fn build_bvh<'m>(
         &self,
@@ -70,52 +66,7 @@ impl<'w> Workers<'w> {
         level: Level,
         arena: &mut Arena<'m>,
     ) -> Result<Bvh<'m>, OutOfMemory> {
-        self.fork.0.install(|| Bvh::build_with(mesh, arena, level, &self.fork))
-    }
-
-    /// Error sums of the tiles of `film`; `None` for a black picture.
-    fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
-        let mean = self.mean(film)?;
-        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let tile = |index: usize| Tile::new(film.width(), film.height(), index);
-        let learn = |mut known: BrightnessClasses, (index, pixels): (usize, &[Pixel])| {
-            known.add(tile(index), pixels, mean);
-            known
-        };
-        let both = |mut one: BrightnessClasses, other: BrightnessClasses| {
-            one += &other;
-            one
-        };
-        let count = tiles.len();
-        Some(self.fork.0.install(|| {
-            let asked =
-                tiles.clone().enumerate().filter(|(tile, _)| BrightnessClasses::uses_tile(*tile, count));
-            let alike =
-                asked.fold(BrightnessClasses::default, learn).reduce(BrightnessClasses::default, both);
-            let shrinkage = alike.shrinkage();
-            let error = |(index, pixels)| TileError::of(tile(index), pixels, mean, &shrinkage);
-            tiles.enumerate().map(error).collect()
-        }))
-    }
-
-    /// Bias of `film` by photon blur; `None` without photons.
-    pub(super) fn blur(&self, film: &Film) -> Option<BiasEstimate> {
-        let mean = self.mean(film)?;
-        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let tiles: Vec<_> = self.fork.0.install(|| tiles.map(|tile| TileBlur::of(tile, mean)).collect());
-        BiasEstimate::of_blur(tiles.into_iter())
-    }
-
-    /// Mean radiance of `film`; `None` if black.
-    pub(super) fn mean(&self, film: &Film) -> Option<f64> {
-        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let mut light = TileLight::default();
-        self.fork
-            .0
-            .install(|| tiles.map(TileLight::of).collect::<Vec<_>>())
-            .into_iter()
-            .for_each(|tile| light += tile);
-        Some(light.mean()).filter(|mean| *mean > 0.0)
+        self.install(|| Bvh::build_with(mesh, arena, level, &self.fork))
     }
 
     /// Runs `work` once on every thread, each with its own working memory.
@@ -124,45 +75,8 @@ impl<'w> Workers<'w> {
         scratch: &mut [Vec<Line>],
         work: impl Fn(&mut Arena) -> Result<T, OutOfMemory> + Sync,
     ) -> Result<Vec<T>, OutOfMemory> {
-        let one = |lines: &mut Vec<Line>| work(&mut Arena::new(bytemuck::cast_slice_mut(lines)));
-        self.fork.0.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
-    }
-
-    /// A pass: task `i` writes to the `i`th part of `out`, of `size` values. Returns the counters, and
-    /// whether all tasks ran before `is_over`.
-    pub(super) fn pass<T: Send>(
-        &self,
-        out: &mut [T],
-        size: usize,
-        scratch: &mut [Vec<Line>],
-        is_over: &(dyn Fn() -> bool + Sync),
-        task: &Task<T>,
-    ) -> Result<(Counters, bool), OutOfMemory> {
-        let tasks = out.len().div_ceil(size.max(1));
-        let queue = Mutex::new(out.chunks_mut(size.max(1)).enumerate());
-        let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
-        let counted = self.on_all(scratch, |arena| {
-            let (mut counters, mut done) = (Counters::default(), 0);
-            while let Some((index, out)) = next() {
-                if is_over() {
-                    break;
-                }
-                counters += task(index, arena, out)?;
-                done += 1;
-            }
-            Ok((counters, done))
-        })?;
-        let (mut counters, mut done) = (Counters::default(), 0);
-        for (more, tasks) in counted {
-            counters += more;
-            done += tasks;
-        }
-        Ok((counters, done == tasks))
-    }
-
-    /// Error of `film`; `None` with fewer than four samples or for a black picture.
-    pub(super) fn estimate(&self, film: &Film, shares: bool) -> Option<ErrorEstimate> {
-        regions::estimate(&self.errors(film)?, film.width(), shares)
+        let one = |lines: &mut Vec<Line>| work(&mut Arena::over(lines));
+        self.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
     }
 }
 
@@ -190,10 +104,10 @@ mod tests {
         let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
 
         let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         let bvh = Workers::new(Some(threads)).unwrap().build_bvh(&mesh, Level::detect(), &mut arena).unwrap();
         let mut kept = vec![Line([0; 64]); bvh.used().bytes() / 64];
-        bvh.copied(&mut Arena::new(bytemuck::cast_slice_mut(&mut kept))).unwrap();
+        bvh.copied(&mut Arena::over(&mut kept)).unwrap();
         bytemuck::cast_slice(&kept).to_vec()
     }
 

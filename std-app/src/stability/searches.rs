@@ -111,7 +111,7 @@ fn photons(table: &mut Table) {
         let random = Random::new(7, 0);
         let position = |i: u32| cloud(&|k| random.single(4 * i + k), i);
         let mut lines = vec![Line([0; 64]); Photons::footprint(COUNT as usize).bytes().div_ceil(64)];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         let Ok(mut photons) = Photons::new(COUNT as usize, &mut arena) else { continue };
         for (i, photon) in photons.as_mut_slice().iter_mut().enumerate() {
             *photon = Photon::new(position(i as u32), Vec3::Z, Vec3::Z, Rgb::ONE);
@@ -142,7 +142,7 @@ fn finds_all(map: &PhotonMap, level: Level, centre: Vec3, radius: f32) -> bool {
 fn finds_nearest(map: &PhotonMap, level: Level, centre: Vec3, radius: f32) -> bool {
     const K: usize = 50;
     let mut lines = vec![Line([0; 64]); Neighbours::footprint(K).bytes().div_ceil(64)];
-    let Ok(mut neighbours) = Neighbours::new(K, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))) else {
+    let Ok(mut neighbours) = Neighbours::new(K, &mut Arena::over(&mut lines)) else {
         return false;
     };
     map.nearest(level, centre, radius, &mut neighbours);

@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(SECTORS, 16);
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
         let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(RECORDS as usize).bytes() / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         let mut cache = IrradianceCache::new(&bounds, RECORDS as usize, &mut arena).unwrap();
         assert_eq!(check(&cache, &[QueryPoint::open(Vec3::splat(0.5), Vec3::Z)]), 0);
         (0..RECORDS).for_each(|i| _ = cache.insert(record(i)));

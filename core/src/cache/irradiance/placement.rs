@@ -62,7 +62,7 @@ impl Floor {
     fn cached(&self, metric: Metric, derivatives: &[Derivatives], error: f32) -> (usize, f64) {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
         let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(CAPACITY).bytes() / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         let mut cache = IrradianceCache::new(&bounds, CAPACITY, &mut arena).unwrap();
         let settings =
             metric::Settings { error, least: 0.002, most: 0.6, ..metric::Settings::new(metric, 1.0) };

@@ -226,7 +226,7 @@ impl Gather {
 
 pub(super) fn with_tables<T>(n: usize, work: impl FnOnce(&CellFlux) -> T) -> T {
     let mut lines = vec![Line([0; 64]); CellFlux::footprint(n).bytes() / 64];
-    work(&CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap())
+    work(&CellFlux::build(n, &mut Arena::over(&mut lines)).unwrap())
 }
 
 const SQUARE: (Point, f64, f64) = ([0.45, 0.5, 0.4], 0.3, 0.0);

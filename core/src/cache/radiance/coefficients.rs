@@ -28,7 +28,7 @@ impl Coefficients {
     /// use halflight_core::{Level, cache::irradiance::Hemisphere, memory::{Arena, Line}};
     /// use halflight_core::cache::radiance::{Coefficients, StrataTables};
     /// let mut lines = vec![Line([0; 64]); StrataTables::footprint(8, 2).bytes() / 64];
-    /// let tables = StrataTables::build(8, 2, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
+    /// let tables = StrataTables::build(8, 2, &mut Arena::over(&mut lines))?;
     /// let (radiance, inverse, directions) = ([[1.0; 3]; 64], [0.0; 64], [[0.0, 0.0, 1.0]; 64]);
     /// let hemisphere = Hemisphere::new(8, &radiance, &inverse, &directions).unwrap();
     /// let found = Coefficients::project(Level::detect(), &tables, &hemisphere).unwrap();

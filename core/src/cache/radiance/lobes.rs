@@ -181,7 +181,7 @@ fn midpoint(i: usize, end: f32) -> f32 {
 /// use halflight_core::cache::radiance::lobes::LobeTable;
 /// use halflight_core::memory::{Arena, Line};
 /// let mut lines = vec![Line([0; 64]); LobeTable::footprint().bytes() / 64];
-/// let table = LobeTable::build(&mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
+/// let table = LobeTable::build(&mut Arena::over(&mut lines))?;
 /// // Metal of alpha .4 seen at 50°: degree 6 is within 2 %. Metal of alpha .15 is left to paths.
 /// let lobe = |alpha: f32| table.lobe(50f32.to_radians().cos(), alpha).unwrap();
 /// assert!(lobe(0.4).degree(0.9, 0.0, 0.02, 6).is_some());

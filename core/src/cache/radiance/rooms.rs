@@ -47,5 +47,5 @@ impl Sky {
 /// Runs `work` with tables for n × n strata.
 pub(super) fn with_tables<T>(n: usize, degree: usize, work: impl FnOnce(&StrataTables) -> T) -> T {
     let mut lines = vec![Line([0; 64]); StrataTables::footprint(n, degree).bytes() / 64];
-    work(&StrataTables::build(n, degree, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap())
+    work(&StrataTables::build(n, degree, &mut Arena::over(&mut lines)).unwrap())
 }

@@ -334,10 +334,9 @@ mod tests {
         let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
         let bytes = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let mut memory = vec![Line([0; 64]); bytes.bytes() / 64];
-        let lights =
-            LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let lights = LightSampler::build(scene, &mut Arena::over(&mut memory)).unwrap();
         let mut memory = vec![Line([0; 64]); EmissionSampler::footprint(&lights).bytes() / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+        let mut arena = Arena::over(&mut memory);
         let emission = EmissionSampler::build(scene, &lights, &bounds, &mut arena).unwrap();
         assert_eq!(arena.available(), 0);
         let mut sum = [0.0f64; 3];

@@ -233,8 +233,7 @@ mod tests {
     fn with_tree(mut items: Vec<Item>, then: impl FnOnce(&Tree, usize)) {
         let count = items.len();
         let mut lines = vec![Line([0; 64]); Tree::footprint(count).bytes() / 64];
-        let (nodes, trails) =
-            Tree::memory(count, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        let (nodes, trails) = Tree::memory(count, &mut Arena::over(&mut lines)).unwrap();
         then(&Tree::build(&mut items, nodes, trails), count);
     }
 

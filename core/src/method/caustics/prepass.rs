@@ -163,7 +163,7 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         let LightPaths { radii, beside_records, ref found, ref mut executor, .. } = self.light_paths;
         // Weights alone: an empty map adds no light.
         let mut line = [Line([0; _])];
-        let empty = Photons::new(0, &mut Arena::new(bytemuck::cast_slice_mut(&mut line)))?.build(0);
+        let empty = Photons::new(0, &mut Arena::over(&mut line))?.build(0);
         let merging = CausticMerging::new([&empty; 2], sampler, radii, found.len() as u32);
         let integrator = self.paths.integrator().with_caustics(merging.beside_records(beside_records));
         pilot::mean_radiance_without_photons(&integrator, *executor)

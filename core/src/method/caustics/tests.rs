@@ -26,8 +26,7 @@ fn with_mirrored_spot(check: impl FnOnce(&RenderContext)) {
         let materials: [Material; 3] = [white, white, mirror];
         let scene = Scene { lights: &[spot], materials: &materials, ..*context.scene };
         let mut memory = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
-        let lights =
-            LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let lights = LightSampler::build(&scene, &mut Arena::over(&mut memory)).unwrap();
         check(&RenderContext { scene: &scene, lights: &lights, ..*context });
     });
 }

@@ -329,7 +329,7 @@ mod tests {
             (0..3000).map(|i| Triangle { vertices: [3 * i, 3 * i + 1, 3 * i + 2], material: 0 }).collect();
         let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
         let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut arena = Arena::over(&mut lines);
         let bvh = Bvh::build(&mesh, &mut arena).unwrap();
         let mut confined = 0;
         for i in 0..200 {

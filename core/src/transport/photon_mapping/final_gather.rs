@@ -102,9 +102,7 @@ impl<'a> GlobalMapLookup<'a> {
         // Limits the search radius: beyond it the ray would be too short.
         let within = self.farthest.min(distance / (MIN_RAY_LENGTH * BLUR_RADIUS_FACTOR));
         let mut lines = [Line([0; 64]); LOOKUP_LINES];
-        let mut neighbours =
-            Neighbours::new(NEAREST_IRRADIANCES, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))
-                .ok()?;
+        let mut neighbours = Neighbours::new(NEAREST_IRRADIANCES, &mut Arena::over(&mut lines)).ok()?;
         self.irradiances.nearest(level, point.position, within, &mut neighbours);
         let squared = neighbours.squared_radius();
         if squared.is_infinite() {
@@ -275,7 +273,7 @@ mod tests {
         let triangles = [[0, 1, 2], [3, 4, 5], [3, 5, 6]].map(|vertices| Triangle { vertices, material: 0 });
         let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
         let mut memory = lines(Bvh::footprint(triangles.len()));
-        let bvh = Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory)).unwrap();
 
         // Irradiance is 1 on the left, 0.1 on the right.
         const PER_AREA: u32 = 20_000;
@@ -294,7 +292,7 @@ mod tests {
             let mut found = vec![Photon::NONE; all.count().div_ceil(IRRADIANCES) * IRRADIANCES];
             for (task, out) in found.chunks_mut(IRRADIANCES).enumerate() {
                 let mut scratch = lines(PrecomputedIrradiance::scratch());
-                all.run(task, &mut Arena::new(bytemuck::cast_slice_mut(&mut scratch)), out).unwrap();
+                all.run(task, &mut Arena::over(&mut scratch), out).unwrap();
             }
             with_map_of(&found, |irradiances| {
                 check(&GlobalMapLookup::new(global, irradiances, 1.0, kernel), (&bvh, level), random);

@@ -2,9 +2,10 @@
 
 use super::{Data, Searcher, Surfel, Task};
 use crate::bench::BenchError;
+use crate::memory::lines;
 use glam::Vec3;
 use halflight_core::bvh::ForkJoin;
-use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
+use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::{
     DensityEstimate, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Uniform,
 };
@@ -23,18 +24,9 @@ pub(super) fn build<'m>(
     join: &impl ForkJoin,
 ) -> Result<PhotonMap<'m>, BenchError> {
     *memory = lines(Photons::footprint(records.len()))?;
-    let mut photons = Photons::new(records.len(), &mut Arena::new(bytemuck::cast_slice_mut(memory)))?;
+    let mut photons = Photons::new(records.len(), &mut Arena::over(memory))?;
     photons.as_mut_slice().copy_from_slice(records);
     Ok(photons.build_with(records.len(), join))
-}
-
-fn lines(footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
-    let mut lines = Vec::new();
-    let needed = footprint.bytes();
-    let count = needed.div_ceil(size_of::<Line>());
-    lines.try_reserve_exact(count).map_err(|_| OutOfMemory { needed, available: 0 })?;
-    lines.resize(count, Line([0; size_of::<Line>()]));
-    Ok(lines)
 }
 
 /// One query per call, in the order of the queries.
@@ -56,7 +48,7 @@ fn disc(query: &Surfel, radius: f32) -> QueryDisc {
 /// Runs `search` with working memory for `k` neighbours.
 fn with_neighbours<T>(k: usize, search: impl FnOnce(&mut Neighbours) -> T) -> Result<T, BenchError> {
     let mut memory = lines(Neighbours::footprint(k))?;
-    let mut neighbours = Neighbours::new(k, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))?;
+    let mut neighbours = Neighbours::new(k, &mut Arena::over(&mut memory))?;
     Ok(search(&mut neighbours))
 }
 

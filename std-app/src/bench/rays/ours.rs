@@ -11,10 +11,10 @@ use halflight_core::scene::Mesh;
 /// BVH as in a render: built in new memory, copied to `kept`; the memory of the build is freed.
 pub(super) fn build<'m>(mesh: &Mesh, level: Level, kept: &'m mut Pages) -> Result<Bvh<'m>, BenchError> {
     let mut working = Pages::new(Bvh::footprint(mesh.triangles.len()))?;
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut working));
+    let mut arena = Arena::over(&mut working);
     let built = Bvh::build_with(mesh, &mut arena, level, &Serial)?;
     *kept = Pages::new(built.used())?;
-    Ok(built.copied(&mut Arena::new(bytemuck::cast_slice_mut(kept)))?)
+    Ok(built.copied(&mut Arena::over(kept))?)
 }
 
 /// Our function for rays of `class`.

@@ -170,8 +170,7 @@ mod tests {
 
     fn film<T>(width: u32, height: u32, light: impl Fn(u32, u32) -> f32, work: impl FnOnce(&Film) -> T) -> T {
         let mut lines = vec![Line([0; 64]); Film::footprint(width, height).bytes() / 64];
-        let mut film =
-            Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        let mut film = Film::new(width, height, &mut Arena::over(&mut lines)).unwrap();
         for y in 0..height {
             for x in 0..width {
                 let place = Tile::position([width, height], x, y);

@@ -9,7 +9,7 @@ pub use verdict::{Audited, Region};
 
 use super::memory::Memory;
 use super::method::{Method, RenderSetup};
-use super::threads::Threads;
+use super::threads::{End, Threads};
 use super::workers::Workers;
 use super::{ErrorEstimate, RenderError, Settings, Shard};
 use choice::Grid;
@@ -18,6 +18,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
 use halflight_core::method::caustics::{unseen, unseen_footprint};
+use halflight_core::method::{Executor, Passed};
 use halflight_core::transport::{CausticMerging, Counters, PathIntegrator, path::WAVE};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -292,14 +293,13 @@ impl<'a> Audit<'a> {
         let places = &state.places;
         let pixels: &mut [Pixel] = bytemuck::cast_slice_mut(&mut state.pixels);
         let before = pixels.to_vec();
-        let is_over = || workers.deadline.is_interrupted();
-        let (counters, all) =
-            workers.pass(pixels, PIXELS_PER_TASK, scratch, &is_over, &|task, arena, out| {
-                let first = task * PIXELS_PER_TASK;
-                truth((&places[first..first + out.len()], samples.clone()), photons, arena, out)
-            })?;
+        let pieces = places.chunks(PIXELS_PER_TASK).zip(pixels.chunks_mut(PIXELS_PER_TASK));
+        let mut executor = Threads::new(workers, scratch).until(End::Round(None));
+        let Passed { counters, is_complete } = executor.pass(pieces, |_, (places, out), worker| {
+            truth((places, samples.clone()), photons, &mut worker.scratch, out)
+        })?;
         state.rays += counters.all_rays();
-        if !all {
+        if !is_complete {
             // Either all pixels have these samples or none.
             pixels.copy_from_slice(&before);
             return Ok(false);

@@ -1,11 +1,11 @@
 //! Irradiance caching in the program: caustic photons if a prepass finds that they pay, cache files, and
 //! surveys.
 
-use super::cache_memory;
 use super::path;
 use super::photon_view::{self, PhotonView};
 use super::{Borrower, Method, RenderSetup, Renderer};
 use crate::render::RenderError;
+use crate::render::audit::Audit;
 use crate::render::cache_file::{self, Half, Header, Reader, View};
 use crate::render::held_out::EXACT;
 use crate::render::memory::Memory;
@@ -20,11 +20,12 @@ use halflight_core::findings::Decision::{Limited, Used};
 use halflight_core::findings::{Finding, Findings, Value};
 use halflight_core::memory::{Footprint, Line};
 use halflight_core::method::caustics::{
-    CausticEmission, CausticPhotons, CausticSettings, CausticUse, Decision, Prepass, least_footprint,
-    prepass, scratch,
+    self, CausticEmission, CausticPhotons, CausticSettings, CausticUse, Decision, Prepass, least_footprint,
+    prepass,
 };
 use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
 use halflight_core::method::path::PathTracing;
+use halflight_core::method::record_placement::CacheBuilder;
 use halflight_core::method::{LastMaps, Method as _};
 use halflight_core::transport::PathIntegrator;
 
@@ -38,11 +39,11 @@ fn find_caustics<'m, F: Features>(
     if !path::are_possible(setup) {
         return Ok((None, CausticUse::default()));
     }
-    let needed = cache_memory::scratch::<F>(cache, true).bytes().saturating_mul(workers.count());
+    let needed = scratch::<F>(cache, true).bytes().saturating_mul(workers.count());
     // Memory is shared equally between records and photons.
-    let reserved = needed.saturating_add(cache_memory::later(cache));
+    let reserved = needed.saturating_add(later(cache));
     let reserved = reserved.saturating_add(least_footprint().bytes());
-    let scratch = scratch::<F>();
+    let scratch = caustics::scratch::<F>();
     if scratch.bytes().saturating_mul(workers.count()) > memory.available() {
         return Ok((None, CausticUse { lacks_memory: true, ..CausticUse::default() }));
     }
@@ -97,13 +98,13 @@ impl<'m, F: Features> Cached<'m, F> {
         memory.set_aside(LOADED, bytes)?;
         let loaded = file.map(Reader::records).transpose()?.unwrap_or_default();
         let fewest = loaded.iter().map(Vec::len).max().unwrap_or(0);
-        let cache = cache_memory::settings::<F>(setup, fewest);
+        let cache = core_settings::<F>(setup, fewest);
         let (emission, caustics) = find_caustics::<F>(setup, memory, &cache)?;
-        let scratch = cache_memory::scratch::<F>(&cache, emission.is_some());
+        let scratch = scratch::<F>(&cache, emission.is_some());
         let scratch = memory.take_each("paths", scratch, workers.count())?;
         let photons = match emission {
             Some(emission) => {
-                let reserved = cache_memory::later(&cache);
+                let reserved = later(&cache);
                 let settings = CausticSettings { beside_records: true, reserved };
                 CausticPhotons::new(&setup.context(), emission, settings, memory)?
             }
@@ -277,4 +278,32 @@ impl<F: Features> Renderer for Cached<'_, F> {
         let photons = self.photons.as_ref().map(|photons| photons.statistics());
         Findings::from(self.finding()).and(self.caustics.findings(photons))
     }
+}
+
+/// Settings of a picture's caches with room for at least `fewest` records each.
+fn core_settings<F: Features>(setup: &RenderSetup, fewest: usize) -> CacheSettings {
+    let RenderSetup { settings, .. } = *setup;
+    CacheSettings {
+        metric: settings.cache.metric,
+        error: settings.cache.allowed(),
+        strata: settings.cache.strata() as usize,
+        fewest,
+        reserve: Audit::bytes::<F>(setup, Method::IrradianceCache.is_biased()),
+        // Records saved to a file keep their validity radii.
+        widens: settings.save_cache.is_none(),
+    }
+}
+
+/// Working memory of a thread, with or without caustic photons.
+fn scratch<F: Features>(cache: &CacheSettings, has_caustics: bool) -> Footprint {
+    let scratch = IrradianceCaching::<F>::scratch(cache);
+    if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch }
+}
+
+/// Bytes to leave when caustic photons take memory: for tables, for the fewest records of each cache, and for
+/// the audit.
+fn later(cache: &CacheSettings) -> usize {
+    let records = CacheBuilder::footprint(cache.fewest).bytes().saturating_mul(2);
+    let tables = cache.gathering_footprint().bytes();
+    records.saturating_add(tables).saturating_add(cache.reserve)
 }

@@ -5,7 +5,6 @@
 //! [`properties`], and an arm in [`set_up`].
 
 mod bidirectional;
-mod cache_memory;
 mod cache_settings;
 mod choice;
 mod irradiance_cache;

@@ -2,9 +2,10 @@
 //! the share of photons that the camera sees.
 
 use super::RenderSetup;
+use crate::memory::lines;
 use halflight_core::bsdf::Features;
 use halflight_core::geometry::Ray;
-use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::memory::{Arena, OutOfMemory};
 use halflight_core::method::LastMaps;
 use halflight_core::photon::{Kernel, Neighbours, PhotonMap};
 use halflight_core::scene::SurfacePoint;
@@ -101,8 +102,8 @@ fn map_view<F: Features>(
     }
     view.seen = f64::from(seen) / f64::from(tested.max(1));
 
-    let mut lines = vec![Line([0; 64]); Neighbours::footprint(NEAREST).bytes() / size_of::<Line>()];
-    let mut neighbours = Neighbours::new(NEAREST, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
+    let mut lines = lines(Neighbours::footprint(NEAREST))?;
+    let mut neighbours = Neighbours::new(NEAREST, &mut Arena::over(&mut lines))?;
     let farthest = bvh.bounds().diagonal();
     for pixel in 0..pixels as u32 {
         let (x, y) = (pixel % width, pixel / width);

@@ -126,7 +126,7 @@ mod tests {
         }
         let mut lines = lines(1);
         for n in [0, SIDE_MAX + 1, usize::MAX] {
-            assert!(CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).is_err());
+            assert!(CellFlux::build(n, &mut Arena::over(&mut lines)).is_err());
         }
     }
 
@@ -135,7 +135,7 @@ mod tests {
     fn one_radiance_has_no_derivatives() {
         let n = 16;
         let mut lines = lines(n);
-        let tables = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        let tables = CellFlux::build(n, &mut Arena::over(&mut lines)).unwrap();
         let inverse: Vec<f32> = (0..n * n).map(|i| 1.0 + (i * 7 % 5) as f32).collect();
         let (radiance, directions) = (vec![[0.5; 3]; n * n], vec![[0.0, 0.0, 1.0]; n * n]);
         let hemisphere = Hemisphere::new(n, &radiance, &inverse, &directions).unwrap();
@@ -152,7 +152,7 @@ mod tests {
     fn a_sky_with_a_slope_turns_and_does_not_move() {
         let n = 64;
         let mut lines = lines(n);
-        let tables = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        let tables = CellFlux::build(n, &mut Arena::over(&mut lines)).unwrap();
         let directions: Vec<_> = (0..n * n)
             .map(|i| direction([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32]))
             .collect();

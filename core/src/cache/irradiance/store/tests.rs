@@ -11,7 +11,7 @@ const BOUNDS: Bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
 
 fn with_cache<T>(capacity: usize, then: impl FnOnce(&mut IrradianceCache) -> T) -> T {
     let mut lines = vec![Line([0xff; 64]); IrradianceCache::footprint(capacity).bytes() / 64];
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let mut arena = Arena::over(&mut lines);
     then(&mut IrradianceCache::new(&BOUNDS, capacity, &mut arena).unwrap())
 }
 

@@ -43,7 +43,7 @@ fn degree_zero_is_the_derivative_of_the_irradiance() {
     /// `CellFlux` has four great circles for a border.
     const CIRCLES: f32 = 3e-3;
     let mut lines = vec![Line([0; 64]); CellFlux::footprint(N).bytes() / 64];
-    let cells = CellFlux::build(N, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+    let cells = CellFlux::build(N, &mut Arena::over(&mut lines)).unwrap();
     let sky = Sky::with_hits(N, |w| room(w, WALLS));
     let irradiance = cells.derivatives(Level::detect(), &sky.hemisphere()).unwrap();
     with_tables(N, 4, |tables| {

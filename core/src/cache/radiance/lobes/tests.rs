@@ -10,7 +10,7 @@ use std::vec;
 
 fn with_lobes<T>(work: impl FnOnce(&LobeTable) -> T) -> T {
     let mut lines = vec![Line([0; 64]); LobeTable::footprint().bytes() / 64];
-    work(&LobeTable::build(&mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap())
+    work(&LobeTable::build(&mut Arena::over(&mut lines)).unwrap())
 }
 
 /// ∫ f Z_k cos dω, and ∫ f L cos dω for a light, over 512 × 512 strata.
