@@ -10,7 +10,7 @@
 //! - [`memory`], [`geometry`], [`sampling`]: arenas, vectors and rays, random numbers and their warps.
 //! - [`scene`]: borrowed views of the meshes, materials, textures, lights and the camera to render.
 //! - [`bsdf`]: scattering at a point. [`bvh`]: ray tracing. [`light`]: sampling of all lights together.
-//! - [`film`]: pixels and tiles. [`photon`]: photon maps. [`cache`]: irradiance and radiance with derivatives.
+//! - [`film`]: pixels and tiles. [`photon`]: photon maps. [`cache`]: cached light with its derivatives.
 //! - [`estimate`]: the error of a picture. [`census`]: the kinds of things in a scene, and the code they
 //!   need.
 //! - [`transport`]: subpaths, path tracing, photon tracing, gathering. [`method`]: the methods of rendering.

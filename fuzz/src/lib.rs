@@ -20,6 +20,7 @@ mod numbers;
 #[cfg(feature = "app")]
 pub mod obj;
 pub mod photons;
+pub mod radiance;
 pub mod records;
 mod rooms;
 pub mod sampling;
@@ -54,6 +55,7 @@ pub const TARGETS: &[Target] = &[
     #[cfg(feature = "app")]
     Target { name: "obj", run: obj::run },
     Target { name: "photons", run: photons::run },
+    Target { name: "radiance", run: radiance::run },
     Target { name: "records", run: records::run },
     Target { name: "sampling", run: sampling::run },
     #[cfg(feature = "app")]

@@ -4,6 +4,7 @@
 //! level, so that a kernel gives the same result everywhere. A single f32 also implements lanes, so that a
 //! kernel of pure arithmetic is its own scalar reference.
 
+use crate::half;
 use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -155,6 +156,11 @@ pub trait Simd: Copy {
     fn load8(self, values: &[f32; 8]) -> Self::F8;
     /// Lanes from memory.
     fn load16(self, values: &[f32; 16]) -> Self::F16;
+    /// Lanes from half floats in memory.
+    #[inline(always)]
+    fn load16_half(self, values: &[u16; 16]) -> Self::F16 {
+        self.load16(&values.map(half::to_f32))
+    }
     /// Lanes `i < n` set.
     fn first8(self, n: u32) -> <Self::F8 as Lanes>::Mask;
     /// Mask from its bits.

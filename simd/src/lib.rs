@@ -11,6 +11,7 @@
 extern crate std;
 
 mod baseline;
+pub mod half;
 mod lanes;
 mod level;
 mod stack;

@@ -77,7 +77,7 @@ impl<L: Lanes<Array = [f32; 16]>> Lanes16<L> {
 
 /// Sum of sixteen lanes by repeated halving.
 #[inline(always)]
-fn total<L: Lanes<Array = [f32; 16]>>(lanes: L) -> f32 {
+pub(super) fn total<L: Lanes<Array = [f32; 16]>>(lanes: L) -> f32 {
     let mut values = lanes.to_array();
     for half in [8, 4, 2, 1] {
         for i in 0..half {

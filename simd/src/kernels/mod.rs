@@ -3,6 +3,7 @@
 
 pub mod boxes;
 pub mod cells;
+pub mod dots;
 pub mod edge;
 pub mod eigen;
 pub mod jumps;

@@ -174,6 +174,14 @@ impl Simd for Avx2 {
         Pair(self.load8(low), self.load8(high))
     }
     #[inline(always)]
+    fn load16_half(self, values: &[u16; 16]) -> Pair<F8> {
+        let [low, high]: &[[u16; 8]; 2] = bytemuck::cast_ref(values);
+        // SAFETY: the token proves the level; sixteen bytes are read from an array of eight halves.
+        let load =
+            |values: &[u16; 8]| F8(unsafe { _mm256_cvtph_ps(_mm_loadu_si128(values.as_ptr().cast())) });
+        Pair(load(low), load(high))
+    }
+    #[inline(always)]
     fn first8(self, n: u32) -> M8 {
         self.mask8(if n >= 8 { 0xff } else { (1 << n) - 1 })
     }
