@@ -166,8 +166,8 @@ fn dot(a: &[f64], b: &[f64], count: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// 28 Zernike polynomials have less error than 49 spherical harmonics, and 45 less than 81, for every lobe
-    /// from alpha 0.2 on. Errors fall with the degree.
+    /// 28 Zernike polynomials have less error than 49 spherical harmonics, and 45 less than 81, for every
+    /// lobe from alpha 0.2 on. Errors fall with the degree.
     #[test]
     fn zernike_polynomials_need_fewer_coefficients_than_spherical_harmonics() {
         let found = errors().unwrap();
