@@ -158,7 +158,9 @@ def ours(description, method, spp, seed, folder):
     picture = folder / "ours.pfm"
     command = [PROGRAM, "render", str(description), "-o", str(picture), "--spp", str(spp)]
     command += ["--method", *method.split()]
-    spent, out = processor_seconds([*command, "--seed", str(seed), "--threads", "1", "--audit", "off", "--json"])
+    # Without an audit `auto` has no cache.
+    command += [] if method == "auto" else ["--audit", "off"]
+    spent, out = processor_seconds([*command, "--seed", str(seed), "--threads", "1", "--json"])
     return read_pfm(picture), spent, json.loads(out)
 
 

@@ -1,11 +1,19 @@
-//! Choice of a method where none is given.
+//! Choice of a method where none is given. The snapshot `tests/tests/choices.txt` shows every change of a choice
+//! in its diff:
+//!
+//!     CHOICES=write cargo test --profile quick -p halflight-tests --test main choice::
 
+use crate::table::scenes::SCENES;
+use core::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
-use halflight::render::{Checkpoint, Method, RenderResult, Settings};
+use halflight::render::{self, Checkpoint, Method, Progress, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material};
+use halflight_simd::Level;
 use halflight_tests::render::{number, render};
 use halflight_tests::scenes::{SceneBuffers, emitter};
+use std::fs;
+use std::path::Path;
 
 const SIZE: u32 = 96;
 const SPP: u32 = 16;
@@ -83,4 +91,48 @@ fn a_resumed_film_goes_on_with_the_method_that_was_chosen() {
     std::fs::remove_file(path).expect("a film");
     assert_eq!([begun.method, resumed.method], [whole.method; 2]);
     assert!(resumed.image.pixels == whole.image.pixels);
+}
+
+/// Samples per pixel of the pictures of the snapshot.
+const BUDGETS: [u32; 3] = [4, 64, 1024];
+
+/// Chosen method and predicted errors of each scene of the table.
+fn choices() -> String {
+    let mut text = format!("# {SIZE} x {SIZE} pixels, seed 0; predicted relMSE, rounded\n");
+    for scene in SCENES {
+        for spp in BUDGETS {
+            scene.with(|scene| {
+                // The choice alone: the picture ends after its first round.
+                let stopped = AtomicBool::new(false);
+                let mut stop_render = |_: &Progress| stopped.store(true, Ordering::Relaxed);
+                let settings = Settings {
+                    width: SIZE,
+                    height: SIZE,
+                    level: Level::BASELINE,
+                    stop: Stop { spp: Some(spp), ..Stop::default() },
+                    ..Settings::default()
+                };
+                let result = render::render(scene, &settings, &mut stop_render, &stopped).expect("a picture");
+                text += &format!("{:>5} spp {:<16}", spp, result.method.name());
+                for method in ["path", "irradiance_cache", "light_paths"] {
+                    let predicted = result.findings.get("method").and_then(|finding| finding.number(method));
+                    text += &predicted.map_or("  -      ".into(), |error| format!("  {error:.1e}"));
+                }
+            });
+            text += &format!("  {}\n", scene.name);
+        }
+    }
+    text
+}
+
+#[test]
+fn choices_are_those_of_the_snapshot() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/choices.txt");
+    let (now, before) = (choices(), fs::read_to_string(&file).unwrap_or_default());
+    if std::env::var_os("CHOICES").is_some_and(|value| value == "write") {
+        fs::write(&file, now).expect("the snapshot can be written");
+        return;
+    }
+    let changed = now.lines().zip(before.lines()).find(|(now, before)| now != before);
+    assert!(now == before, "choices differ, the first: {changed:?}");
 }

@@ -4,7 +4,7 @@
 use crate::table::scenes::{SKY, room_with_window, with_sky};
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::render::{self, RenderResult, Settings, Stop};
+use halflight::render::{self, Method, RenderResult, Settings, Stop};
 use halflight_core::findings::Decision;
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_tests::scenes::{SceneBuffers, constant_environment};
@@ -27,8 +27,14 @@ fn with_constant(mut scene: SceneBuffers) -> SceneBuffers {
 
 fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let mut settings =
-        Settings { width: SIZE, height: SIZE, stop, reuse: Some(false), ..Settings::default() };
+    let mut settings = Settings {
+        method: Some(Method::Path),
+        width: SIZE,
+        height: SIZE,
+        stop,
+        reuse: Some(false),
+        ..Settings::default()
+    };
     change(&mut settings);
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }

@@ -4,7 +4,7 @@
 use core::sync::atomic::AtomicBool;
 use halflight::compare::compare;
 use halflight::load::{self, LoadOptions, LoadedScene};
-use halflight::render::{RejectedTile, RenderResult, Settings, Stop, render};
+use halflight::render::{Method, RejectedTile, RenderResult, Settings, Stop, render};
 use halflight::report::{Provenance, Race, RaceEntry, Run};
 use halflight::save::to_srgb;
 use halflight_core::film::Dropped;
@@ -38,7 +38,8 @@ fn picture(loaded: &LoadedScene, settings: &Settings) -> RenderResult {
 /// Settings of 64 samples, against a reference of 256 with another seed.
 fn settings(loaded: &LoadedScene, seed: u32) -> Settings {
     let stop = |spp| Stop { spp: Some(spp), ..Stop::default() };
-    let base = Settings { width: SIZE, height: SIZE, seed, stop: stop(64), ..Settings::default() };
+    let (method, stop_at) = (Some(Method::Path), stop(64));
+    let base = Settings { method, width: SIZE, height: SIZE, seed, stop: stop_at, ..Settings::default() };
     let reference = picture(loaded, &Settings { seed: seed + 9, stop: stop(256), ..base.clone() }).image;
     Settings { reference: Some(Arc::new(reference)), ..base }
 }

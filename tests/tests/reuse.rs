@@ -2,7 +2,7 @@
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::render::{self, RenderResult, Settings, Stop};
+use halflight::render::{self, Method, RenderResult, Settings, Stop};
 use halflight_core::bsdf::All;
 use halflight_core::film::Film;
 use halflight_core::findings::Decision;
@@ -29,7 +29,8 @@ const WIDEST: f64 = 6.2;
 
 fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let mut settings = Settings { width: SIZE, height: SIZE, stop, ..Settings::default() };
+    let (method, size) = (Some(Method::Path), SIZE);
+    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
     change(&mut settings);
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }

@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::render::{self, RenderResult, Settings, Stop};
+use halflight::render::{self, Method, RenderResult, Settings, Stop};
 use halflight_core::Level;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
@@ -27,7 +27,8 @@ const CORNELL_MEAN: [f64; 3] = [0.2123, 0.1509, 0.0652];
 
 fn render(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let mut settings = Settings { width: size, height: size, stop, ..Settings::default() };
+    let method = Some(Method::Path);
+    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
     change(&mut settings);
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }

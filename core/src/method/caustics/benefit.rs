@@ -35,7 +35,7 @@ const MOST_MISSING: f64 = 5e-3;
 const PILOT_SAMPLES: f64 = 4.0 * 16.0 * 1024.0;
 
 /// Work of a path that gathers photons, relative to one that does not, for the same rays.
-const GATHERING: f64 = 1.3;
+const GATHERING: f64 = 1.45;
 
 /// Largest photon budget, relative to the usual one; and the ratio of the photons' light to all other from
 /// which on the budget grows.
