@@ -16,7 +16,7 @@
 //! density of the rays of one pixel, η = L π r² the expected number of light paths in the disc of a merge
 //! (`eta_vcm`). Roulette stays out of the weights, which add up to one without it.
 
-use bytemuck::{Pod, Zeroable};
+pub use crate::transport::walk::sums::Sums;
 
 /// How often each technique is used for a sample of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,32 +28,6 @@ pub struct Counts {
     pub connections: f32,
     /// Light samples of a camera vertex.
     pub light_samples: f32,
-}
-
-/// The running sums of one subpath.
-///
-/// | | `last` | `rest` | `pending_merge` |
-/// |---|---|---|---|
-/// | Georgiev's and SmallVCM's | dVCM | dVC = η dVM | the term η of one vertex in dVC |
-/// | techniques | connects over the latest segment | all before it | merge at the latest rough vertex |
-/// | lacks the factor | 1 | p← | p←, and 1 at the vertex of the merge |
-/// | [`Sums::at_light`] | n p_light / (e c) | 1 / (e c), or 0 for delta lights | 0 |
-/// | [`Sums::at_camera`] | L / q | 0 | 0 |
-/// | [`Sums::arrive`] | · d² / c, or 0 at a delta vertex | / c | / c |
-/// | [`Sums::scatter`] | n_C / p | c / p (last + rest p←) | c / p · pending p←, or c η / p if rough |
-/// | [`Sums::scatter_delta`] | 0 | · c / n² | · c / n² |
-///
-/// SmallVCM merges at every vertex, so its dVC has a term η for each. Its densities of emission per area are
-/// per étendue here.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Sums {
-    /// Technique that connects over the latest segment.
-    pub last: f32,
-    /// Techniques before it.
-    pub rest: f32,
-    /// Merge at the latest rough vertex, which the next vertex may make void.
-    pub pending_merge: f32,
 }
 
 impl Sums {

@@ -6,5 +6,6 @@ pub(in crate::transport) mod dimension;
 pub(in crate::transport) mod light;
 pub(in crate::transport) mod mis;
 pub(in crate::transport) mod path_classes;
+pub(in crate::transport) mod sums;
 pub(in crate::transport) mod termination;
 pub(in crate::transport) mod visibility;
