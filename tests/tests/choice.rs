@@ -1,5 +1,5 @@
-//! Choice of a method where none is given. The snapshot `tests/tests/choices.txt` shows every change of a choice
-//! in its diff:
+//! Choice of a method where none is given. The snapshot `tests/tests/choices.txt` shows every change of a
+//! choice in its diff:
 //!
 //!     CHOICES=write cargo test --profile quick -p halflight-tests --test main choice::
 

@@ -242,7 +242,7 @@ struct Adapter<'a, F, M> {
 }
 
 impl<'a, F: Features, M: CoreMethod> Adapter<'a, F, M> {
-    /// The method that `new` makes with `scratch` for each thread, besides the bytes that the audit will take.
+    /// The method that `new` makes with `scratch` for each thread, besides the bytes of the audit.
     fn boxed<'s: 'a>(
         setup: &RenderSetup<'s>,
         memory: &mut Memory<'a>,
