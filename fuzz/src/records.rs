@@ -79,7 +79,7 @@ fn record(input: &mut Unstructured) -> Result<Record> {
     let mut pair = || Ok([number()?, number()?]);
     let (gradient, rotation) = ([pair()?, pair()?, pair()?], [pair()?, pair()?, pair()?]);
     let (bend, [noise, error], [allowed, shining]) = (pair()?, pair()?, pair()?);
-    let irradiance = within(input)?;
+    let (irradiance, edge_fraction) = (within(input)?, within(input)?);
     let mut sectors = || if input.arbitrary()? { input.arbitrary() } else { Ok([u8::MAX; SECTORS]) };
     let (boundary, free): ([u8; SECTORS], [u8; SECTORS]) = (sectors()?, sectors()?);
     let radii = [r1, r1 * (1.0 + longer)];
@@ -88,6 +88,7 @@ fn record(input: &mut Unstructured) -> Result<Record> {
         normal: normal.to_array(),
         axis: axis.to_array(),
         irradiance: irradiance.to_array(),
+        edge_fraction: edge_fraction.to_array(),
         gradient,
         rotation,
         bend,

@@ -28,6 +28,12 @@ impl Bsdf {
         matches!(self, Bsdf::Diffuse(_)) || self.base().max_element() >= MIN_BASE_ALBEDO
     }
 
+    /// True if a coat, rough or smooth, covers such a component.
+    #[inline]
+    pub(crate) fn has_coated_base(&self) -> bool {
+        matches!(self, Bsdf::Glossy(_) | Bsdf::Plastic(_)) && self.has_diffuse()
+    }
+
     /// True if it ends a caustic: photons count here, and the light that it scatters is no caustic.
     #[inline]
     pub(crate) fn is_receiver(&self) -> bool {

@@ -7,6 +7,7 @@
 //! define F, T and base, and show that energy is conserved.
 
 use super::BsdfSample;
+use super::albedo::SchlickFit;
 use super::conductor::half_cosine;
 use super::ggx::Ggx;
 use crate::Rgb;
@@ -34,12 +35,15 @@ pub(super) trait Coat {
     /// ∫ 2c T(c) dc: mean transmittance for uniform light from the base, an estimate.
     fn mean_transmittance(&self) -> Rgb;
 
+    /// Least-squares fit to T.
+    fn transmittance_fit(&self) -> SchlickFit<Rgb>;
+
     /// Probability of the coat's lobe: its share of the energy that leaves towards `wo`, with the weight
-    /// [`COAT_WEIGHT`].
+    /// [`COAT_WEIGHT`] of the coat, and `base_weight` of the base.
     #[inline]
-    fn coat_probability(&self, c: f32, transmittance: Rgb) -> f32 {
+    fn coat_probability(&self, c: f32, transmittance: Rgb, base_weight: f32) -> f32 {
         let coat = COAT_WEIGHT * self.specular_albedo(c).element_sum();
-        let base = (self.base() * transmittance * self.mean_transmittance()).element_sum();
+        let base = (self.base() * transmittance * self.mean_transmittance()).element_sum() * base_weight;
         if base > 0.0 { (coat / (coat + base)).clamp(0.0, 1.0) } else { 1.0 }
     }
 }
@@ -51,30 +55,43 @@ pub(super) fn is_narrow(coat: &impl Coat) -> bool {
     coat.alpha() * coat.alpha() < coat.reflectance(1.0).max_element()
 }
 
-/// [`sample`] of base or coat alone. Weight and density are those of the chosen lobe, including the
-/// probability of the choice. The flag is true for the coat.
+/// [`sample`] of base or coat alone, the base chosen with the weight `base_weight`. Weight and density are
+/// those of the chosen lobe, including the probability of the choice. The flag is true for the coat.
 #[inline]
-pub(super) fn sample_apart(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
+pub(super) fn sample_apart(
+    coat: &impl Coat,
+    wo: Vec3,
+    u: [f32; 3],
+    base_weight: f32,
+) -> Option<(BsdfSample, bool)> {
     let transmittance_o = coat.transmittance(wo.z);
-    let is_coat = u[2] < coat.coat_probability(wo.z, transmittance_o);
+    let p = coat.coat_probability(wo.z, transmittance_o, base_weight);
+    let is_coat = u[2] < p;
     let wi = match is_coat {
+        true if coat.alpha() == 0.0 => {
+            return Some((BsdfSample::mirrored(wo, coat.reflectance(wo.z) / p, p), true));
+        }
         true => Ggx::new(coat.alpha()).sample_reflection(wo, [u[0], u[1]]),
         false => cosine_hemisphere([u[0], u[1]]),
     };
-    let [of_base, of_coat] = evaluate_apart(coat, wo, wi);
+    let [of_base, of_coat] = evaluate_apart(coat, wo, wi, base_weight);
     let (value, pdf) = if is_coat { of_coat } else { of_base };
     (pdf > 0.0).then(|| (BsdfSample::reflection(wi, value / pdf, pdf), is_coat))
 }
 
-/// [`evaluate`] of the base and of the rough coat, each alone.
+/// [`evaluate`] of the base and of the coat, each alone, with the densities of [`sample_apart`]; zeros for a
+/// smooth coat.
 #[inline]
-pub(super) fn evaluate_apart(coat: &impl Coat, wo: Vec3, wi: Vec3) -> [(Rgb, f32); 2] {
+pub(super) fn evaluate_apart(coat: &impl Coat, wo: Vec3, wi: Vec3, base_weight: f32) -> [(Rgb, f32); 2] {
     if !(wi.z > 0.0) {
         return [(Rgb::ZERO, 0.0); 2];
     }
     let transmittance_o = coat.transmittance(wo.z);
-    let p = coat.coat_probability(wo.z, transmittance_o);
+    let p = coat.coat_probability(wo.z, transmittance_o, base_weight);
     let of_base = (base_value(coat, wi, transmittance_o), (1.0 - p) * (wi.z * FRAC_1_PI));
+    if coat.alpha() == 0.0 {
+        return [of_base, (Rgb::ZERO, 0.0)];
+    }
     let density = p * Ggx::new(coat.alpha()).reflection_density(wo, wo + wi);
     [of_base, (coat_value(coat, wo, wi), density)]
 }
@@ -83,7 +100,7 @@ pub(super) fn evaluate_apart(coat: &impl Coat, wo: Vec3, wi: Vec3) -> [(Rgb, f32
 #[inline]
 pub(super) fn sample(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
     let transmittance_o = coat.transmittance(wo.z);
-    let p = coat.coat_probability(wo.z, transmittance_o);
+    let p = coat.coat_probability(wo.z, transmittance_o, 1.0);
     let smooth = coat.alpha() == 0.0;
     if u[2] < p {
         if smooth {
@@ -108,7 +125,7 @@ pub(super) fn evaluate(coat: &impl Coat, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         return (Rgb::ZERO, 0.0);
     }
     let transmittance_o = coat.transmittance(wo.z);
-    both_lobes(coat, wo, wi, transmittance_o, coat.coat_probability(wo.z, transmittance_o))
+    both_lobes(coat, wo, wi, transmittance_o, coat.coat_probability(wo.z, transmittance_o, 1.0))
 }
 
 /// f cos θ_i of the base.

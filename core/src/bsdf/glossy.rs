@@ -7,7 +7,7 @@
 //! a weighted mean of two such surfaces.
 
 use super::CoatTransmittance;
-use super::albedo::SchlickAlbedo;
+use super::albedo::{SchlickAlbedo, SchlickFit, schlick_albedo_fit};
 use super::coated::Coat;
 use super::{fresnel, range::unit};
 use crate::Rgb;
@@ -86,5 +86,16 @@ impl Coat for Glossy {
     #[inline]
     fn mean_transmittance(&self) -> Rgb {
         Rgb::ONE - SchlickAlbedo::mean(self.alpha).of(self.specular)
+    }
+
+    #[inline]
+    fn transmittance_fit(&self) -> SchlickFit<Rgb> {
+        // The albedo is specular · (white - edge) + edge.
+        let [white, edge] = schlick_albedo_fit(self.alpha);
+        let of = |white: f32, edge: f32| self.specular * (white - edge) + Rgb::splat(edge);
+        SchlickFit {
+            constant: Rgb::ONE - of(white.constant, edge.constant),
+            edge: -of(white.edge, edge.edge),
+        }
     }
 }

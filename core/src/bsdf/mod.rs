@@ -162,25 +162,37 @@ impl Bsdf {
         BsdfView { base_alone, ..self.view::<F>(wo) }
     }
 
-    /// [`Bsdf::sample`] of the base or the rough coat alone. Weight and density are those of the chosen lobe,
-    /// including the probability of the choice. The flag is true for the coat.
+    /// [`Bsdf::sample`] of the base or the coat alone. Weight and density are those of the chosen lobe,
+    /// including the probability of the choice; the base has the weight `base_weight` in the choice, 1 in
+    /// [`Bsdf::sample`], 0 to sample the coat always. The flag is true for the coat.
     #[inline]
-    pub(crate) fn sample_apart<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
+    pub(crate) fn sample_apart<F: Features>(
+        &self,
+        wo: Vec3,
+        u: [f32; 3],
+        base_weight: f32,
+    ) -> Option<(BsdfSample, bool)> {
         let wo = above_horizon(wo);
         match self {
-            Bsdf::Glossy(b) if F::GLOSSY => coated::sample_apart(b, wo, u),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::sample_apart(b, wo, u),
+            Bsdf::Glossy(b) if F::GLOSSY => coated::sample_apart(b, wo, u, base_weight),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::sample_apart(b, wo, u, base_weight),
             _ => None,
         }
     }
 
-    /// [`Bsdf::evaluate`] of the base and of the rough coat, each alone.
+    /// [`Bsdf::evaluate`] of the base and of the coat, each alone, with the densities of
+    /// [`Bsdf::sample_apart`].
     #[inline]
-    pub(crate) fn evaluate_apart<F: Features>(&self, wo: Vec3, wi: Vec3) -> [(Rgb, f32); 2] {
+    pub(crate) fn evaluate_apart<F: Features>(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        base_weight: f32,
+    ) -> [(Rgb, f32); 2] {
         let wo = above_horizon(wo);
         match self {
-            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi),
+            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi, base_weight),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi, base_weight),
             _ => [(Rgb::ZERO, 0.0); 2],
         }
     }

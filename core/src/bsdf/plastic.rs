@@ -8,7 +8,7 @@
 //! that reached it. If rough, it returns less, as in every model of one bounce between microfacets.
 
 use super::CoatTransmittance;
-use super::albedo::{self, SchlickAlbedo};
+use super::albedo::{self, SchlickAlbedo, SchlickFit};
 use super::coated::Coat;
 use super::fresnel;
 use super::range::{MAX_INDEX, unit};
@@ -106,5 +106,11 @@ impl Coat for Plastic {
     #[inline]
     fn mean_transmittance(&self) -> Rgb {
         Rgb::splat(1.0 - fresnel::mean_external_reflectance(self.eta))
+    }
+
+    #[inline]
+    fn transmittance_fit(&self) -> SchlickFit<Rgb> {
+        let SchlickFit { constant, edge } = albedo::transmittance_fit(self.alpha, self.eta);
+        SchlickFit { constant: Rgb::splat(constant), edge: Rgb::splat(edge) }
     }
 }

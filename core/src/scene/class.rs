@@ -20,6 +20,11 @@ impl Surface {
         matches!(self, Surface::Diffuse { .. } | Surface::Glossy { ior: None, .. })
     }
 
+    /// True if the surface may have a diffuse component somewhere, with or without a coat.
+    pub fn may_have_base(&self) -> bool {
+        matches!(self, Surface::Diffuse { .. } | Surface::Glossy { .. })
+    }
+
     /// True if the surface may be perfectly specular somewhere.
     pub fn may_be_smooth(&self) -> bool {
         match self {

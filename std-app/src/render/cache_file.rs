@@ -9,7 +9,7 @@ use halflight_core::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLCACH", version: 3, name: "cache" };
+const KIND: Kind = Kind { magic: *b"HLCACH", version: 4, name: "cache" };
 
 /// Records per section.
 const AT_ONCE: usize = 1 << 12;
@@ -196,7 +196,7 @@ impl<'r> Reader<'r> {
 
 /// Whether a cache can hold this record.
 fn is_sound(record: &Record) -> bool {
-    let Record { position, normal, axis, irradiance, radii, overlap, reach, .. } = *record;
+    let Record { position, normal, axis, irradiance, radii, overlap, reach, edge_fraction, .. } = *record;
     let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
     let [r1, r2] = radii;
     finite(&position)
@@ -207,6 +207,7 @@ fn is_sound(record: &Record) -> bool {
         && 0.0 <= r1
         && r1 <= r2
         && overlap >= 0.0
+        && edge_fraction.iter().all(|fraction| (0.0..=1.0).contains(fraction))
 }
 
 /// Numbers of records of both caches in a cache file given as `bytes`, of any scene.
@@ -258,6 +259,7 @@ mod tests {
             reach: 0.3,
             error: f32::INFINITY,
             boundary: [7; SECTORS],
+            edge_fraction: [0.0, x, 1.0],
             ..Record::default()
         }
     }
@@ -309,6 +311,17 @@ mod tests {
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
         let why = Reader::open(&path, &identity(), MOST).and_then(Reader::records).err().unwrap().to_string();
         assert!(why.contains("damaged.cache: is damaged: it is too short"), "{why}");
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn another_format_is_named() {
+        let (path, mut bytes) = file("older", [1, 1]);
+        bytes[7] = 3;
+        std::fs::write(&path, &bytes).unwrap();
+        let why = Reader::open(&path, &identity(), MOST).err().unwrap().to_string();
+        let wanted = "older.cache: is a cache of format 3, and this version of the program reads format 4";
+        assert!(why.contains(wanted), "{why}");
         std::fs::remove_file(path).unwrap();
     }
 

@@ -7,6 +7,10 @@
 mod data;
 #[cfg(test)]
 mod derive;
+mod fit;
+
+pub(crate) use fit::SchlickFit;
+pub(in crate::bsdf) use fit::{schlick_albedo as schlick_albedo_fit, transmittance as transmittance_fit};
 
 use super::range::unit;
 use super::{fresnel, sqrt};

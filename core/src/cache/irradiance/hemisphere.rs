@@ -2,6 +2,7 @@
 //! (+z).
 
 use crate::Rgb;
+use crate::bsdf::fresnel::schlick_weight;
 use crate::light::luminance;
 use core::f32::consts::PI;
 
@@ -72,6 +73,15 @@ impl<'a> Hemisphere<'a> {
         sum * (PI / (self.n * self.n) as f32)
     }
 
+    /// M₅ = ∫ L (1 - cos)⁵ cos dω: π/N² Σ L (1 - cos)⁵.
+    pub fn edge_moment(&self) -> Rgb {
+        let rows = self.radiance.chunks_exact(self.n).zip(self.directions.chunks_exact(self.n));
+        let of_row = |(radiance, directions): (&[[f32; 3]], &[[f32; 3]])| -> Rgb {
+            radiance.iter().zip(directions).map(|(&l, &[.., z])| Rgb::from(l) * schlick_weight(z)).sum()
+        };
+        rows.map(of_row).sum::<Rgb>() * (PI / (self.n * self.n) as f32)
+    }
+
     /// Variance of the luminance of [`Hemisphere::irradiance`], estimated from second differences along the
     /// rows: a linear change between strata is no noise, a pattern finer than the strata is.
     pub fn variance(&self) -> f32 {
@@ -125,6 +135,7 @@ pub(super) struct Distances {
 mod tests {
     use super::*;
     use crate::sampling::Random;
+    use crate::sampling::warp::cosine_hemisphere;
     use std::vec;
 
     /// Radiances uniform on [0, 1] have a variance of 1/12; a linear rise along the rows has none. The
@@ -143,5 +154,29 @@ mod tests {
         assert!((variance(&noisy) / wanted - 1.0).abs() < 0.1, "{} {wanted}", variance(&noisy));
         let even: vec::Vec<_> = (0..N * N).map(|i| [(i % N) as f32; 3]).collect();
         assert!(variance(&even) < 1e-6 * wanted);
+    }
+
+    /// In light 1 + s cos θ the moment is 2π (B(2, 6) + s B(3, 6)), with Euler's B(2, 6) = 1/42 and B(3, 6) =
+    /// 1/168.
+    #[test]
+    fn the_edge_moment_is_that_of_linear_light() {
+        const N: usize = 32;
+        let random = Random::new(2, 2);
+        let directions: vec::Vec<_> = (0..N * N)
+            .map(|i| {
+                let [u, v] = [0, 1].map(|k| random.single((2 * i + k) as u32));
+                let (row, column) = ((i / N) as f32, (i % N) as f32);
+                cosine_hemisphere([(column + u) / N as f32, (row + v) / N as f32]).to_array()
+            })
+            .collect();
+        for slope in [0.0, 1.0, -0.9] {
+            let radiance: vec::Vec<_> =
+                directions.iter().map(|&[.., z]| [1.0 + slope * z, 1.0, 0.0]).collect();
+            let inverse = vec![1.0; N * N];
+            let found = Hemisphere::new(N, &radiance, &inverse, &directions).unwrap().edge_moment();
+            let wanted = 2.0 * PI * (1.0 / 42.0 + slope / 168.0);
+            assert!((found.x / wanted - 1.0).abs() < 0.02, "{slope}: {found} {wanted}");
+            assert_eq!(found.z, 0.0);
+        }
     }
 }

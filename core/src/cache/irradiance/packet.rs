@@ -54,11 +54,30 @@ impl IrradianceCache<'_> {
         points: &Points,
         known: &mut [Option<CachedIrradiance>; POINTS],
     ) -> [f32; POINTS] {
+        self.query::<true>(level, points, known)
+    }
+
+    /// [`IrradianceCache::at_all`] for a scene without coats, with zeros for `edge_moment`.
+    pub(crate) fn at_all_without_coats(
+        &self,
+        level: Level,
+        points: &Points,
+        known: &mut [Option<CachedIrradiance>; POINTS],
+    ) -> [f32; POINTS] {
+        self.query::<false>(level, points, known)
+    }
+
+    fn query<const COATS: bool>(
+        &self,
+        level: Level,
+        points: &Points,
+        known: &mut [Option<CachedIrradiance>; POINTS],
+    ) -> [f32; POINTS] {
         if points.wanted == 0 {
             return [0.0; POINTS];
         }
-        let [red, green, blue, shining, weights, exposed] =
-            level.dispatch(PacketQuery { cache: self, points });
+        let Found { values: [red, green, blue, shining, weights, exposed], edge } =
+            level.dispatch(PacketQuery::<COATS> { cache: self, points });
         let mut left = points.wanted;
         while left != 0 {
             let i = left.trailing_zeros() as usize % POINTS;
@@ -66,6 +85,7 @@ impl IrradianceCache<'_> {
             let weight = weights[i];
             known[i] = (weight > 0.0).then(|| CachedIrradiance {
                 irradiance: Rgb::new(red[i], green[i], blue[i]) / weight,
+                edge_moment: Rgb::from(edge.map(|channel| channel[i])) / weight,
                 shining: shining[i] / weight,
             });
         }
@@ -73,16 +93,23 @@ impl IrradianceCache<'_> {
     }
 }
 
-/// Query of sixteen points. Its result is, over all valid records, the weighted sums of irradiance per
-/// channel and of `shining`, the sum of weights, and the maximum squared distance to records that an overhang
-/// may make invalid.
-struct PacketQuery<'a> {
+/// Query of sixteen points, with the moments of light for `COATS`.
+struct PacketQuery<'a, const COATS: bool> {
     cache: &'a IrradianceCache<'a>,
     points: &'a Points,
 }
 
-impl Kernel for PacketQuery<'_> {
-    type Out = [[f32; POINTS]; 6];
+/// Result of a query over all valid records.
+struct Found {
+    /// Weighted sums of irradiance per channel and of `shining`, the sum of weights, and the maximum squared
+    /// distance to records that an overhang may make invalid.
+    values: [[f32; POINTS]; 6],
+    /// Weighted sums of M₅ per channel.
+    edge: [[f32; POINTS]; 3],
+}
+
+impl<const COATS: bool> Kernel for PacketQuery<'_, COATS> {
+    type Out = Found;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Out {
@@ -94,32 +121,37 @@ impl Kernel for PacketQuery<'_> {
             within: simd.load16(within),
         };
         let (tree, records, least_cos) = cache.parts();
-        let mut sums = Sums {
+        let mut sums = Sums::<S, COATS> {
             simd,
             records,
             least_cos,
             query,
             sums: [simd.splat16(0.0); 5],
+            edge: [simd.splat16(0.0); 3],
             exposed: simd.splat16(0.0),
         };
         tree.at_all(position, *wanted, &mut sums);
         let [a, b, c, d, e] = sums.sums;
         let exposed = sums.exposed.to_array();
-        [a.to_array(), b.to_array(), c.to_array(), d.to_array(), e.to_array(), exposed]
+        Found {
+            values: [a.to_array(), b.to_array(), c.to_array(), d.to_array(), e.to_array(), exposed],
+            edge: sums.edge.map(|channel| channel.to_array()),
+        }
     }
 }
 
 /// Sums of a query over the records so far.
-struct Sums<'a, S: Simd> {
+struct Sums<'a, S: Simd, const COATS: bool> {
     simd: S,
     records: &'a [Record],
     least_cos: f32,
     query: Query<S::F16>,
     sums: [S::F16; 5],
+    edge: [S::F16; 3],
     exposed: S::F16,
 }
 
-impl<S: Simd> Visit for Sums<'_, S> {
+impl<S: Simd, const COATS: bool> Visit for Sums<'_, S, COATS> {
     #[inline(always)]
     fn visit(&mut self, record: u32, points: u32) {
         let Some(record) = self.records.get(record as usize) else { return };
@@ -133,6 +165,14 @@ impl<S: Simd> Visit for Sums<'_, S> {
         let terms = [red, green, blue, self.simd.splat16(record.shining), self.simd.splat16(1.0)];
         for (sum, term) in self.sums.iter_mut().zip(terms) {
             *sum = (*sum + weight.weight * term).select(is_valid, *sum);
+        }
+        if COATS {
+            for ((sum, channel), fraction) in
+                self.edge.iter_mut().zip([red, green, blue]).zip(record.edge_fraction)
+            {
+                let term = channel * self.simd.splat16(fraction);
+                *sum = (*sum + weight.weight * term).select(is_valid, *sum);
+            }
         }
         if record.is_free() {
             return;
@@ -190,6 +230,7 @@ mod tests {
             boundary: core::array::from_fn(|k| if number(16) < 0.3 { 255 } else { (200 + 4 * k) as u8 }),
             free: core::array::from_fn(|k| if number(17) < 0.3 { 255 } else { (100 + 4 * k) as u8 }),
             least: 0.01 * number(18),
+            edge_fraction: [number(19), number(20), number(21)],
             ..Record::default()
         }
     }
@@ -206,6 +247,10 @@ mod tests {
             let mut known = [None; POINTS];
             let exposed = cache.at_all(level, &query, &mut known);
             assert_eq!(known, wanted, "{}", level.name());
+            let mut without_coats = [None; POINTS];
+            assert_eq!(cache.at_all_without_coats(level, &query, &mut without_coats), exposed);
+            let no_edge = |known: CachedIrradiance| CachedIrradiance { edge_moment: Rgb::ZERO, ..known };
+            assert_eq!(without_coats, wanted.map(|known| known.map(no_edge)), "{}", level.name());
             for (point, exposed) in points.iter().zip(exposed) {
                 let mut farthest = 0.0f32;
                 cache.visit(point, |record, _| farthest = farthest.max(record.exposed(point)));

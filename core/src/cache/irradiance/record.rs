@@ -6,6 +6,7 @@
 
 use super::lanes::{One, Width};
 use super::{Derivatives, Validity};
+use crate::Rgb;
 use crate::geometry::Frame;
 use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
@@ -34,7 +35,7 @@ pub const OVERHANG_RADIUS_FACTOR: f32 = 4.0;
 
 /// Irradiance record; see the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C, align(16))]
+#[repr(C)]
 pub struct Record {
     // The fields that decide validity come first, in one cache line.
     /// Position x_i.
@@ -76,6 +77,9 @@ pub struct Record {
     /// Distance per sector, in 255ths of `reach`, up to which no overhang is so close above a point that the
     /// record is invalid there.
     pub free: [u8; SECTORS],
+    /// M₅/E_i of each channel, 0 … 1, with M₅ = ∫ L (1 - cos)⁵ cos dω: the light that Schlick's reflectance
+    /// keeps from the base of a coat.
+    pub edge_fraction: [f32; 3],
 }
 
 impl Record {
@@ -113,7 +117,16 @@ impl Record {
             least: reach.least,
             boundary: [u8::MAX; SECTORS],
             free: [u8::MAX; SECTORS],
+            edge_fraction: [0.0; 3],
         }
+    }
+
+    /// Sets M₅ of each channel.
+    pub fn set_edge_moment(&mut self, moment: Rgb) {
+        let fraction =
+            |moment: f32, whole: f32| if whole > 0.0 { (moment / whole).clamp(0.0, 1.0) } else { 0.0 };
+        let moment = moment.to_array();
+        self.edge_fraction = core::array::from_fn(|i| fraction(moment[i], self.irradiance[i]));
     }
 
     /// Sets the relative variance of E_i. If supports may overlap, the overlap s follows from it: averaging

@@ -18,6 +18,8 @@ pub const GREATEST_DEVIATION: f32 = 0.2;
 pub struct CachedIrradiance {
     /// Irradiance without direct light of emitters, in W/m².
     pub irradiance: Rgb,
+    /// M₅ = ∫ L (1 - cos)⁵ cos dω of the same light, in W/m².
+    pub edge_moment: Rgb,
     /// Cosine-weighted fraction of the hemisphere that sees emitters or the environment directly.
     pub shining: f32,
 }
@@ -85,18 +87,23 @@ impl<'m> IrradianceCache<'m> {
     /// with the second order where a metric has it.
     #[inline]
     pub fn at(&self, point: &QueryPoint) -> Option<CachedIrradiance> {
-        let (mut sum, mut shining, mut weights) = (Rgb::ZERO, 0.0, 0.0);
+        let (mut sum, mut edge, mut shining, mut weights) = (Rgb::ZERO, Rgb::ZERO, 0.0, 0.0);
         self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
                 && let Some((irradiance, weight)) = record.at(point, self.least_cos)
             {
                 sum += weight * irradiance;
+                edge += weight * (irradiance * Rgb::from(record.edge_fraction));
                 shining += weight * record.shining;
                 weights += weight;
             }
             true
         });
-        (weights > 0.0).then(|| CachedIrradiance { irradiance: sum / weights, shining: shining / weights })
+        (weights > 0.0).then(|| CachedIrradiance {
+            irradiance: sum / weights,
+            edge_moment: edge / weights,
+            shining: shining / weights,
+        })
     }
 
     /// Irradiance from the first valid record, without interpolation, and the distance of that record as in
@@ -109,7 +116,9 @@ impl<'m> IrradianceCache<'m> {
                 && let Some((irradiance, _)) = record.at(point, self.least_cos)
             {
                 let exposed = record.exposed(point);
-                found = Some((CachedIrradiance { irradiance, shining: record.shining }, exposed));
+                let edge_moment = irradiance * Rgb::from(record.edge_fraction);
+                let cached = CachedIrradiance { irradiance, edge_moment, shining: record.shining };
+                found = Some((cached, exposed));
             }
             found.is_none()
         });

@@ -5,6 +5,7 @@
 //! is direct light, which each path of the picture finds itself ([`PathClasses`]). All N² rays of a point
 //! form one or several waves, in blocks of 8 × 8 strata for coherent traversal.
 
+use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::cache::irradiance::{
@@ -241,6 +242,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let luminance = derivatives.luminance();
         record.set_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
         record.shining = strata.shining as f32 / (n * n) as f32;
+        record.set_edge_moment(strata.hemisphere().map_or(Rgb::ZERO, |hemisphere| hemisphere.edge_moment()));
         self.find_boundary(&mut record, place, &frame, &strata, counters);
         self.add_overhangs(&mut record, place);
         Ok(Some(record))

@@ -1,5 +1,5 @@
-//! Irradiance cache as an estimator of the path tracer: reflected light at diffuse vertices, looked up for a
-//! block of vertices at once.
+//! Irradiance cache as an estimator of the path tracer: reflected light at diffuse vertices and at the bases
+//! of coats, looked up for a block of vertices at once.
 
 use crate::bsdf::{Bsdf, Features};
 use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS, Points, QueryPoint};
@@ -24,6 +24,10 @@ const LIGHT_SAMPLES: u32 = 4;
 /// BSDF sampling.
 const SMALL: f32 = 0.1;
 
+/// Weight of a base with a record beside its coat: the record has the base's indirect light, and light
+/// samples find most of the rest.
+const BASE_WEIGHT: f32 = 0.6;
+
 /// Irradiance caches that paths look up.
 #[derive(Clone, Copy)]
 pub enum CacheView<'a> {
@@ -39,7 +43,7 @@ pub enum CacheView<'a> {
 impl CacheView<'_> {
     /// Looks up all `queries`, each with its sample number. Writes the distance up to which each is `exposed`
     /// ([`IrradianceCache::at_all`]).
-    fn find(
+    fn find<F: Features>(
         &self,
         level: Level,
         queries: &[Option<(QueryPoint, u32)>; BLOCK],
@@ -52,12 +56,15 @@ impl CacheView<'_> {
                 let mut points = [Points::NONE; 2];
                 queries.for_each(|(i, (query, sample))| points[*sample as usize & 1].set(i, query));
                 for (cache, points) in caches.iter().zip(&points) {
-                    let reach = cache.at_all(level, points, found);
+                    let reach = match F::GLOSSY {
+                        true => cache.at_all(level, points, found),
+                        false => cache.at_all_without_coats(level, points, found),
+                    };
                     exposed.iter_mut().zip(reach).for_each(|(exposed, reach)| *exposed = exposed.max(reach));
                 }
             }
             CacheView::Known => {
-                let known = CachedIrradiance { irradiance: Rgb::ZERO, shining: 0.0 };
+                let known = CachedIrradiance { irradiance: Rgb::ZERO, edge_moment: Rgb::ZERO, shining: 0.0 };
                 queries.for_each(|(i, _)| found[i] = Some(known));
             }
             CacheView::UnderConstruction(cache) => {
@@ -74,7 +81,7 @@ impl CacheView<'_> {
 /// Sample number of a path, if the path looks up the cache at `point`, the hit of its ray.
 fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &PathSettings) -> Option<u32> {
     let path = wave.paths.get(wave.rays.get(ray)?.tag as usize)?;
-    let asks = point.material.surface.may_be_diffuse()
+    let asks = point.material.surface.may_have_base()
         && path.classes.has_rough()
         && u32::from(path.segments) < settings.max_depth
         // Records do not store their distance from the camera.
@@ -95,6 +102,11 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         }
     }
 
+    #[inline]
+    fn separates_coat(&self, _: &SceneContext<F>, bsdf: &Bsdf, found: &Self::Found) -> bool {
+        found.is_some() && bsdf.has_coated_base()
+    }
+
     fn look_up(
         &self,
         (context, settings): (&SceneContext<F>, &PathSettings),
@@ -111,7 +123,7 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         let open = |(point, sample): (&SurfacePoint, u32)| {
             (QueryPoint::open(point.position, point.frame.normal), sample)
         };
-        self.find(context.level, &asking.map(|asking| asking.map(open)), found, &mut exposed);
+        self.find::<F>(context.level, &asking.map(|asking| asking.map(open)), found, &mut exposed);
         if exposed == [0.0; BLOCK] {
             return;
         }
@@ -122,7 +134,7 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
             let (query, sample) = asking[i].map(open).filter(|_| within[i] < exposed[i])?;
             Some((QueryPoint { within: within[i], ..query }, sample))
         });
-        self.find(context.level, &again, found, &mut exposed);
+        self.find::<F>(context.level, &again, found, &mut exposed);
     }
 
     #[inline]
@@ -134,10 +146,15 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         found: Option<CachedIrradiance>,
         add: &mut impl FnMut(KnownLight),
     ) -> RemainingLight {
-        let (Some(indirect), Bsdf::Diffuse(diffuse)) = (found, &vertex.bsdf) else {
-            return RemainingLight::all(vertex);
+        let PathVertex { throughput, ref bsdf, wo, apart, .. } = *vertex;
+        let Some(indirect) = found else { return RemainingLight::all(vertex) };
+        let contribution = match bsdf {
+            Bsdf::Diffuse(diffuse) => throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI,
+            _ if F::GLOSSY && bsdf.has_coated_base() => {
+                throughput * bsdf.base_radiance::<F>(wo, indirect.irradiance, indirect.edge_moment)
+            }
+            _ => return RemainingLight::all(vertex),
         };
-        let contribution = vertex.throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI;
         add(KnownLight { contribution, blur: Rgb::ZERO });
         // Light samples alone estimate direct light if few gather rays saw an emitter and nothing is
         // specular, but not with an environment, which is not sampled where it seemed hidden. Both cases take
@@ -145,12 +162,18 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         let has_environment = context.scene.environment.is_some();
         let ends = indirect.shining < SMALL && !context.has_mirrors && !has_environment;
         let light_samples = if ends || has_environment { self.light_samples(context) } else { 1 };
-        RemainingLight { light_samples, ends, ..RemainingLight::of(PathClasses::DIRECT) }
+        let direct = RemainingLight { light_samples, ends, ..RemainingLight::of(PathClasses::DIRECT) };
+        if !apart {
+            return direct;
+        }
+        // The coat reflects all light.
+        let base_weight = if ends { 0.0 } else { BASE_WEIGHT };
+        RemainingLight { narrow: vertex.rest, base_weight, ..direct }
     }
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// This path tracer with caches of indirect light at diffuse vertices with a valid record: even samples
+    /// This path tracer with caches of indirect light at diffuse vertices and bases of coats with a valid record: even samples
     /// use the first, odd samples the second. With a limit of depth only the first vertex of a path does,
     /// since records do not store their distance from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> PathIntegrator<'a, F, CacheView<'a>> {

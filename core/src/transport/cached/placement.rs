@@ -1,5 +1,6 @@
 //! Gather points of the picture: its pixels in coarse-to-fine order, of which the first n are evenly spread
-//! for any n, and the diffuse point that a pixel sees directly or through other surfaces ([`Via`]).
+//! for any n, and the diffuse point that a pixel sees directly or through other surfaces ([`Via`]), bare or
+//! under a coat.
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
@@ -135,14 +136,24 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             let (met, point) = context.surface_from(hit, &mut segment, opacity, counters)?;
             width += spread * segment.length;
             let bsdf = self.context.bsdf_at(&point);
+            let is_wanted = seen == sight && point.frame.normal.dot(point.geometric_normal) > SMOOTH;
             if let Bsdf::Diffuse(_) = bsdf {
-                let smooth = point.frame.normal.dot(point.geometric_normal) > SMOOTH;
-                return (smooth && seen == sight).then_some((point, width));
+                return is_wanted.then_some((point, width));
             }
             let wo = point.frame.to_local(-Vec3::from(segment.ray.direction));
             let [u, v] = dimension::scattering(sampler, segments);
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
-            let sample = bsdf.sample::<F>(wo, [u, v, lobe])?;
+            let sample = if F::GLOSSY && bsdf.has_coated_base() {
+                // A path goes on by the coat, and a smooth coat shows its base and what it mirrors.
+                let base_weight = if seen == sight { 1.0 } else { 0.0 };
+                let sample = bsdf.sample_apart::<F>(wo, [u, v, lobe], base_weight);
+                match sample.filter(|(_, is_coat)| *is_coat) {
+                    Some((sample, _)) if seen != sight || sample.delta => sample,
+                    _ => return is_wanted.then_some((point, width)),
+                }
+            } else {
+                bsdf.sample::<F>(wo, [u, v, lobe])?
+            };
             if !sample.delta {
                 if sight == Via::Specular {
                     return None;

@@ -221,7 +221,11 @@ impl<'a> CausticMerging<'a> {
 impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
     type State = MergingState;
     type Found = ();
-    const SEPARATES_COATS: bool = true;
+
+    #[inline]
+    fn separates_coat(&self, context: &SceneContext<F>, bsdf: &Bsdf, _: &()) -> bool {
+        bsdf.gathers_photons_on_base(context.separates_coats())
+    }
 
     #[inline]
     fn at_vertex(
@@ -275,8 +279,8 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
         (sample, wi): (&LightSample, Vec3),
         weight: f32,
     ) -> f32 {
-        let PathVertex { point, ref bsdf, wo, apart, .. } = *vertex;
-        if apart || bsdf.is_receiver() || !self.may_come_by(bsdf, state.ratio) {
+        let PathVertex { point, ref bsdf, wo, .. } = *vertex;
+        if bsdf.is_receiver() || !self.may_come_by(bsdf, state.ratio) {
             return weight;
         }
         let link = ChainLink { point, bsdf, near: wo, far: wi, coat_alone: false };
@@ -292,11 +296,12 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
         context: &SceneContext<F>,
         vertex: &PathVertex,
         state: &mut MergingState,
-        (sample, is_narrow): (&BsdfSample, bool),
+        (sample, is_coat): (&BsdfSample, bool),
     ) {
-        let PathVertex { point, ref bsdf, wo, apart, .. } = *vertex;
-        let is_rough = bsdf.is_receiver() && !is_narrow;
-        let coat_alone = apart && is_narrow;
+        let PathVertex { point, ref bsdf, wo, .. } = *vertex;
+        // A coat may be sampled separately for records where photons are gathered on the whole surface.
+        let coat_alone = is_coat && !sample.delta && bsdf.gathers_photons_on_base(context.separates_coats());
+        let is_rough = bsdf.is_receiver() && !sample.delta && !coat_alone;
         if is_rough {
             (state.progress, state.radius) = (state.here, self.discs.radius(point.position));
         }
@@ -309,7 +314,12 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
             ratio if ratio == 0.0 || !self.may_come_by(bsdf, ratio) => 0.0,
             ratio => {
                 let link = ChainLink { point, bsdf, near: wo, far: sample.direction, coat_alone };
-                ratio_behind(ratio.abs(), &link, sample, context)
+                // Light paths know the usual probability of the coat, which both densities have to use.
+                let pdf = match coat_alone {
+                    true => bsdf.evaluate_apart::<F>(wo, sample.direction, 1.0)[1].1,
+                    false => sample.pdf,
+                };
+                ratio_behind(ratio.abs(), &link, &BsdfSample { pdf, ..*sample }, context)
             }
         };
     }

@@ -79,7 +79,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
             return None;
         }
         let [(mut f, pdf), coat] = match apart {
-            true => bsdf.evaluate_apart::<F>(wo, wi),
+            true => bsdf.evaluate_apart::<F>(wo, wi, rest.base_weight),
             false => [bsdf.evaluate::<F>(wo, wi), (Rgb::ZERO, 0.0)],
         };
         if apart && rest.is_lit {
@@ -89,7 +89,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
             return None;
         }
         let ray = shadow_ray(point, sample)?;
-        let alone = sample.delta || rest.ends;
+        let alone = sample.delta || rest.ends && !apart;
         let each = 1.0 / rest.light_samples as f32;
         let weigh = |pdf: f32| match alone {
             true => each,

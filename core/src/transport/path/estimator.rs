@@ -38,7 +38,7 @@ pub struct PathVertex<'v, 'a> {
     pub(in crate::transport) travelled: f32,
     /// β, the throughput of the path so far.
     pub(in crate::transport) throughput: Rgb,
-    /// True if an estimator supplies light of the base only, so that the narrow coat is sampled separately.
+    /// True if an estimator supplies light of the base only, so that the coat is sampled separately.
     pub(in crate::transport) apart: bool,
     /// Classes of light that the path had to find on its last segment.
     pub(in crate::transport) came: PathClasses,
@@ -60,14 +60,17 @@ pub struct KnownLight {
 pub struct RemainingLight {
     /// Classes behind the wide lobes of the surface; `None` if the estimator supplies all of them.
     pub(in crate::transport) wide: Option<PathClasses>,
-    /// Classes behind a mirror or a narrow coat.
+    /// Classes behind a mirror, or a coat that is sampled separately.
     pub(in crate::transport) narrow: PathClasses,
     /// True if the estimator supplies direct light, except through a narrow coat.
     pub(in crate::transport) is_lit: bool,
     /// Number of light samples of next-event estimation.
     pub(in crate::transport) light_samples: u32,
-    /// True if next-event estimation finds all of the rest, so that the path ends.
+    /// True if next-event estimation finds all of the rest, so that the path ends, or goes on by the coat
+    /// alone.
     pub(in crate::transport) ends: bool,
+    /// Weight of the base in the choice between a coat and its base, if they are sampled separately.
+    pub(in crate::transport) base_weight: f32,
 }
 
 impl RemainingLight {
@@ -80,7 +83,14 @@ impl RemainingLight {
     /// Light of `classes`.
     #[inline]
     pub(in crate::transport) fn of(classes: PathClasses) -> Self {
-        Self { wide: Some(classes), narrow: classes, is_lit: false, light_samples: 1, ends: false }
+        Self {
+            wide: Some(classes),
+            narrow: classes,
+            is_lit: false,
+            light_samples: 1,
+            ends: false,
+            base_weight: 1.0,
+        }
     }
 
     /// Light that neither of two estimators supplies.
@@ -92,6 +102,7 @@ impl RemainingLight {
             is_lit: self.is_lit || other.is_lit,
             light_samples: self.light_samples.max(other.light_samples),
             ends: self.ends || other.ends,
+            base_weight: self.base_weight.min(other.base_weight),
         }
     }
 }
@@ -112,14 +123,17 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
     type State: Pod;
     /// Result of the lookup for a vertex.
     type Found: Copy + Default;
-    /// True if the estimator supplies light of the bases of narrow coats only, so that these coats are
-    /// sampled separately.
-    const SEPARATES_COATS: bool = false;
-
     /// Maximum number of light samples per vertex.
     #[inline]
     fn light_samples(&self, _context: &SceneContext<F>) -> u32 {
         1
+    }
+
+    /// True if the coat of `bsdf` is sampled separately from its base, since the estimator supplies light of
+    /// the base alone.
+    #[inline]
+    fn separates_coat(&self, _context: &SceneContext<F>, _bsdf: &Bsdf, _found: &Self::Found) -> bool {
+        false
     }
 
     /// Light added to a sample of the pixel `place` of the tile, independent of the sample's path.
@@ -202,14 +216,15 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
         weight
     }
 
-    /// Called when the path leaves `vertex` by `sample`, of a narrow or a wide lobe.
+    /// Called when the path leaves `vertex` by `sample`. The flag is true for a delta lobe, and for a coat
+    /// that is sampled separately.
     #[inline]
     fn scattered(
         &self,
         _context: &SceneContext<F>,
         _vertex: &PathVertex,
         _state: &mut Self::State,
-        (_sample, _is_narrow): (&BsdfSample, bool),
+        (_sample, _is_coat): (&BsdfSample, bool),
     ) {
     }
 }
@@ -223,11 +238,15 @@ impl<F: Features> LightEstimator<F> for () {
 impl<F: Features, A: LightEstimator<F, State = ()>, B: LightEstimator<F>> LightEstimator<F> for (A, B) {
     type State = B::State;
     type Found = (A::Found, B::Found);
-    const SEPARATES_COATS: bool = A::SEPARATES_COATS || B::SEPARATES_COATS;
 
     #[inline]
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {
         self.0.light_samples(context).max(self.1.light_samples(context))
+    }
+
+    #[inline]
+    fn separates_coat(&self, context: &SceneContext<F>, bsdf: &Bsdf, found: &Self::Found) -> bool {
+        self.0.separates_coat(context, bsdf, &found.0) || self.1.separates_coat(context, bsdf, &found.1)
     }
 
     #[inline]

@@ -54,11 +54,11 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
         estimator.look_up((context, settings), (wave, range.clone()), &points, &mut found, counters);
 
         let mut vertices = [const { None }; BLOCK];
-        for ((vertex, point), i) in vertices.iter_mut().zip(&points).zip(range) {
+        for (((vertex, point), found), i) in vertices.iter_mut().zip(&points).zip(&found).zip(range) {
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
             let index = ray.tag as usize;
             let Some(path) = memory.path(wave, index, &mut none) else { continue };
-            match integrator.arrive(path, (&ray, &hit), point.as_ref(), counters) {
+            match integrator.arrive(path, (&ray, &hit), (point.as_ref(), found), counters) {
                 Ok(met) => *vertex = Some(met),
                 Err(Some(through)) => wave.push_ray(index, through),
                 Err(None) => {}
@@ -81,7 +81,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
                 estimator.connect((context, settings), vertex, state, &mut push);
             }
         }
-        for (vertex, rest) in lit().filter(|(_, rest)| !rest.ends) {
+        for (vertex, rest) in lit().filter(|(vertex, rest)| !rest.ends || vertex.apart) {
             let Some(path) = memory.path(wave, vertex.path, &mut none) else { continue };
             if let Some(ray) = integrator.scatter(path, vertex, rest, counters) {
                 wave.push_ray(vertex.path, ray);
@@ -115,7 +115,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         &self,
         Path { path, state, shared }: Path<E::State, R::State>,
         (ray, hit): (&Ray, &Hit),
-        point: Option<&'v SurfacePoint<'a>>,
+        (point, found): (Option<&'v SurfacePoint<'a>>, &E::Found),
         counters: &mut Counters,
     ) -> Result<PathVertex<'v, 'a>, Option<Ray>> {
         R::resume(shared, path);
@@ -168,9 +168,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             distance,
             travelled: path.travelled + distance,
             throughput: path.throughput.into(),
-            apart: F::GLOSSY
-                && E::SEPARATES_COATS
-                && bsdf.gathers_photons_on_base(self.context.separates_coats()),
+            apart: F::GLOSSY && self.estimator.separates_coat(&self.context, &bsdf, found),
             came: path.classes,
             rest: path.classes.behind(&bsdf),
             bsdf,
@@ -247,18 +245,20 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let PathVertex { point, ref bsdf, ref sampler, wo, first, segments, apart, .. } = *vertex;
         let [u, v] = dimension::scattering(sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
-        let (sample, is_narrow) = match apart {
-            true => bsdf.sample_apart::<F>(wo, [u, v, lobe])?,
+        let (sample, is_coat) = match apart {
+            true => bsdf.sample_apart::<F>(wo, [u, v, lobe], rest.base_weight)?,
             false => bsdf.sample::<F>(wo, [u, v, lobe]).map(|sample| (sample, sample.delta))?,
         };
-        R::sample_bsdf(shared, || match is_narrow {
+        R::sample_bsdf(shared, || match is_coat {
             true => Rgb::ZERO,
             false if apart => Rgb::ONE,
             false => bsdf.base_part(wo, sample.direction, sample.weight * sample.pdf),
         });
-        path.classes = if is_narrow { rest.narrow } else { rest.wide? };
+        path.classes = if is_coat { rest.narrow } else { rest.wide? };
         let mut throughput = vertex.throughput * sample.weight;
-        let survives = R::leave(shared, (point, bsdf), throughput, segments);
+        // A coat over a cached base is dark, but all noise of the pixel is its own.
+        let is_first_coat = is_coat && rest.base_weight < 1.0 && segments == 1;
+        let survives = R::leave(shared, (point, bsdf), throughput, segments) || is_first_coat;
         let direction = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, direction) {
             return None;
@@ -280,7 +280,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             counters.dropped.unfinished += 1;
             return None;
         }
-        self.estimator.scattered(&self.context, vertex, state, (&sample, is_narrow));
+        self.estimator.scattered(&self.context, vertex, state, (&sample, is_coat));
         path.throughput = throughput.to_array();
         // MIS compares one BSDF sample with n light samples.
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf / rest.light_samples as f32 };

@@ -109,7 +109,11 @@ impl<'a> PhotonLight<'a> {
 impl<F: Features> LightEstimator<F> for PhotonLight<'_> {
     type State = ();
     type Found = ();
-    const SEPARATES_COATS: bool = true;
+
+    #[inline]
+    fn separates_coat(&self, context: &SceneContext<F>, bsdf: &Bsdf, _: &()) -> bool {
+        bsdf.gathers_photons_on_base(context.separates_coats())
+    }
 
     /// Surfaces with a diffuse part take all reflected light from photons. With a limit of depth only the
     /// first vertex of a path does, since photons do not store their path length.

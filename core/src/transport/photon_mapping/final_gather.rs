@@ -216,7 +216,11 @@ impl PhotonMaps<'_> {
 impl<F: Features> LightEstimator<F> for &[PhotonMaps<'_>; 2] {
     type State = ();
     type Found = ();
-    const SEPARATES_COATS: bool = true;
+
+    #[inline]
+    fn separates_coat(&self, context: &SceneContext<F>, bsdf: &Bsdf, _: &()) -> bool {
+        bsdf.gathers_photons_on_base(context.separates_coats())
+    }
 
     #[inline]
     fn at_vertex(

@@ -268,7 +268,7 @@ impl<F: Features> LightWalk<'_, F> {
         let [u, v] = numbers.pair(first + SCATTERING);
         let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
         let sample = match F::GLOSSY && visitor.is_apart(state, &vertex) {
-            true => bsdf.sample_apart::<F>(from, [u, v, lobe]),
+            true => bsdf.sample_apart::<F>(from, [u, v, lobe], 1.0),
             false => bsdf.sample::<F>(from, [u, v, lobe]).map(|sample| (sample, sample.delta)),
         };
         let (sample, is_specular) =

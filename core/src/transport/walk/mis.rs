@@ -69,7 +69,7 @@ impl ChainLink<'_> {
     pub(in crate::transport) fn pdf<F: Features>(&self, context: &SceneContext<F>) -> f32 {
         let Self { point, bsdf, near, far, coat_alone } = *self;
         if F::GLOSSY && coat_alone {
-            return bsdf.evaluate_apart::<F>(far, near)[1].1;
+            return bsdf.evaluate_apart::<F>(far, near, 1.0)[1].1;
         }
         if far.z > 0.0 {
             return bsdf.evaluate::<F>(far, near).1;

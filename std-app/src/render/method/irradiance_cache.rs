@@ -27,6 +27,7 @@ use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching}
 use halflight_core::method::path::PathTracing;
 use halflight_core::method::record_placement::CacheBuilder;
 use halflight_core::method::{LastMaps, Method as _};
+use halflight_core::scene::{Material, Surface};
 use halflight_core::transport::PathIntegrator;
 
 /// Emission of caustic photons, if they pay and fit into memory besides the needs of `cache`.
@@ -182,9 +183,14 @@ impl<'m, F: Features> Cached<'m, F> {
         let sum = |of: fn(&IrradianceCache) -> u64| caches.iter().map(|cache| of(cache)).sum::<u64>();
         let both = |halves: [u32; 2]| halves.into_iter().map(u64::from).sum::<u64>();
         let refused = sum(|cache| cache.refused());
+        let may_be_coated = |material: &&Material| matches!(material.surface, Surface::Glossy { .. });
+        let coats = self.stage.scene.materials.iter().filter(may_be_coated).count() as u64;
         let (decision, reason) = match (self.method.is_cut(), refused) {
             (true, _) => (Limited, "filling was cut short: other points are path traced"),
             (false, 1..) => (Limited, "not enough memory: other points are path traced"),
+            (false, 0) if coats > 0 => {
+                (Used, "indirect light of diffuse surfaces and of the bases of coats is interpolated")
+            }
             (false, 0) => (Used, "indirect light of diffuse surfaces is interpolated"),
         };
         let gathered = both(self.method.gathered()) - both(self.loaded.map(|half| half.gathered));
@@ -196,6 +202,7 @@ impl<'m, F: Features> Cached<'m, F> {
             .with("records", Value::Count(sum(|cache| cache.records().len() as u64)))
             .with("capacity", Value::Count(sum(|cache| cache.capacity() as u64)))
             .with("gathered", Value::Count(gathered))
+            .with_count("coated_materials", coats)
             .with_count("loaded", both(self.loaded.map(|half| half.records)))
             .with_count("refused", refused)
     }

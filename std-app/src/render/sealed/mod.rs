@@ -119,7 +119,14 @@ impl<'r> Reader<'r> {
             return Err(reader.refusal(format!("is no {} file", kind.name)));
         }
         if opening != kind.opening() {
-            let what = format!("is a {} of another format: of another version or machine", kind.name);
+            let version = u16::from_be_bytes([opening[6], opening[7]]);
+            let what = match version == u16::from(kind.version) {
+                true => format!("is a {} of another machine: its byte order differs", kind.name),
+                false => format!(
+                    "is a {} of format {version}, and this version of the program reads format {}: render it anew",
+                    kind.name, kind.version
+                ),
+            };
             return Err(reader.refusal(what));
         }
         let mut length = [0; 4];
