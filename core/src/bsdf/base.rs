@@ -7,6 +7,11 @@ use bytemuck::{Pod, Zeroable};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
+/// Largest alpha of a coat whose transmittance follows the fit, and largest reflectance at normal incidence of
+/// a coat of Schlick that does at any alpha.
+const MAX_FITTED_ALPHA: f32 = 0.35;
+const MAX_FITTED_SPECULAR: f32 = 0.1;
+
 /// Coat over a diffuse base.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -63,6 +68,19 @@ impl Bsdf {
             Bsdf::Glossy(b) => Some(coated::Coat::transmittance_fit(b)),
             Bsdf::Plastic(b) => Some(coated::Coat::transmittance_fit(b)),
             _ => None,
+        }
+    }
+
+    /// True if [`Bsdf::base_transmittance_fit`] is good to half a percent. It is not for very rough coats,
+    /// whose shadowing dims T over all angles, unless they reflect little.
+    #[inline]
+    pub(crate) fn has_fitted_coat(&self) -> bool {
+        match self {
+            Bsdf::Glossy(b) => {
+                b.alpha() <= MAX_FITTED_ALPHA || b.specular().max_element() <= MAX_FITTED_SPECULAR
+            }
+            Bsdf::Plastic(b) => b.alpha() <= MAX_FITTED_ALPHA,
+            _ => false,
         }
     }
 
@@ -130,7 +148,7 @@ mod tests {
     #[test]
     fn the_base_of_any_coat_reflects_nearly_as_by_brute_force_even_in_the_light_of_a_spot() {
         let colour = Rgb::new(0.8, 0.5, 0.1);
-        for alpha in [0.0, 0.01, 0.09, 0.3, 0.7] {
+        for alpha in [0.0, 0.01, 0.09, 0.2, 0.3] {
             let coats = [
                 Bsdf::Glossy(Glossy::new(colour, Rgb::new(0.04, 0.3, 0.1), alpha, 0.0)),
                 Bsdf::Plastic(Plastic::new(colour, Rgb::splat(0.04), alpha, 0.0, 1.5)),

@@ -48,6 +48,10 @@ impl Glossy {
         self.alpha
     }
 
+    pub(super) fn specular(&self) -> Rgb {
+        self.specular
+    }
+
     pub(super) fn coat_transmittance(&self) -> Option<CoatTransmittance> {
         (self.base != Rgb::ZERO).then(|| CoatTransmittance::schlick(self.alpha, self.specular))
     }

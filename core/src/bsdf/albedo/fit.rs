@@ -3,8 +3,9 @@
 //!
 //! The fit is linear in T. With the moments a = ∫ 2c T dc and b = ∫ 2c (1 - c)⁵ T dc it is
 //! t₅ = (b - a / 21) / (1/66 - 1/441) and t₀ = a - t₅ / 21; the fit keeps a and b. It is exact for the smooth
-//! coat of Schlick. The error for dielectrics, smooth or rough, in light that varies over the hemisphere is
-//! 0.1 to 0.4 % of the light of the base.
+//! coat of Schlick. For dielectrics of alpha up to 0.35 the error in light of random bands is at most 0.5 %.
+//! The shadowing of rougher microfacets dims T over all angles, which (1 - c)⁵ does not follow: at alpha 1 the
+//! fit is 14 % too bright at c = 0.5.
 
 use super::{AMPLITUDES, COSINES, Place, ROUGHNESSES, STEP, amplitude, data, lerp, roughness};
 use crate::bsdf::{fresnel, sqrt};
@@ -177,9 +178,18 @@ mod tests {
         };
         let glossy =
             |alpha: f32, f0: f32| Bsdf::Glossy(Glossy::new(Rgb::splat(0.5), Rgb::splat(f0), alpha, 0.0));
-        for alpha in [0.0, 1e-3, 0.02, 0.1, 0.3, 0.5, 1.0] {
-            let coats = [plastic(alpha, 1.3), plastic(alpha, 1.5), plastic(alpha, 2.0), glossy(alpha, 0.04)];
-            for bsdf in coats.into_iter().chain([glossy(alpha, 0.3)]) {
+        for alpha in [0.0, 1e-3, 0.02, 0.1, 0.2, 0.35, 0.6, 1.0] {
+            let mut coats = vec![glossy(alpha, 0.04), glossy(alpha, 0.1)];
+            if alpha <= 0.35 {
+                coats.extend([
+                    plastic(alpha, 1.3),
+                    plastic(alpha, 1.5),
+                    plastic(alpha, 2.0),
+                    glossy(alpha, 0.3),
+                ]);
+            }
+            for bsdf in coats {
+                assert!(bsdf.has_fitted_coat());
                 let uniform = ratio(&bsdf, &|_| 1.0) - 1.0;
                 assert!(uniform.abs() < 1e-3, "{bsdf:?}: {uniform}");
                 // Light of sixteen bands of height, each of random brightness.
@@ -192,12 +202,13 @@ mod tests {
                 }
                 let (rms, mean) = ((squares / 64.0).sqrt(), sum / 64.0);
                 assert!(rms < 5e-3 && mean.abs() < 1.5e-3, "{bsdf:?}: rms {rms}, mean {mean}");
-                // Light from above and light from the rim.
+                // All light from above, or from the rim.
                 let (high, low) =
                     (ratio(&bsdf, &|c| f64::from(c > 0.5)), ratio(&bsdf, &|c| f64::from(c < 0.3)));
-                assert!((high - 1.0).abs() < 8e-3 && (low - 1.0).abs() < 2e-2, "{bsdf:?}: {high} {low}");
+                assert!((high - 1.0).abs() < 0.01 && (low - 1.0).abs() < 0.025, "{bsdf:?}: {high} {low}");
             }
         }
+        assert!(!plastic(0.6, 1.5).has_fitted_coat() && !glossy(0.6, 0.3).has_fitted_coat());
     }
 
     #[test]
