@@ -1,5 +1,5 @@
 //! Irradiance caching (Ward, Rubinstein and Clear 1988): the indirect light of diffuse surfaces is gathered
-//! at few points and interpolated between them. Paths find all other light.
+//! at few points and interpolated between them, also under coats. Paths find all other light.
 //!
 //! One cache serves the even samples, another the odd ones, and each is filled without the other: the
 //! difference of the halves of the film shows the errors of records too. First both caches are filled, then

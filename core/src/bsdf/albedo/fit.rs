@@ -66,7 +66,7 @@ fn edge_reflectance(eta: f32) -> f32 {
     let r = (eta - 1.0) / (eta + 1.0);
     let q = sqrt(r);
     let p = 5.788_148_4 - 1.527_836_6 * q;
-    r * (0.541_340_06 + q * (-2.687_063_8 + q * (6.531_360_2 + q * (-8.610_34 + q * p))))
+    r * (0.541_340_06 + q * (-2.687_063_8 + q * (6.531_36 + q * (-8.610_34 + q * p))))
 }
 
 /// Interpolated moments of a row of roughnesses.

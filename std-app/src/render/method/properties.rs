@@ -71,7 +71,7 @@ const TABLE: &[Properties] = &[
     Properties {
         method: Method::IrradianceCache,
         name: "irradiance-cache",
-        about: "Path tracing with interpolated indirect light of diffuse surfaces",
+        about: "Path tracing with interpolated indirect light of diffuse surfaces and bases of coats",
         is_biased: true,
         converges: false,
         may_join_caustics: true,
