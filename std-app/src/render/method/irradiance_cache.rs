@@ -184,7 +184,7 @@ impl<'m, F: Features> Cached<'m, F> {
         let both = |halves: [u32; 2]| halves.into_iter().map(u64::from).sum::<u64>();
         let refused = sum(|cache| cache.refused());
         let may_be_coated = |material: &&Material| matches!(material.surface, Surface::Glossy { .. });
-        let coats = self.stage.scene.materials.iter().filter(may_be_coated).count() as u64;
+        let coats = self.setup.scene.materials.iter().filter(may_be_coated).count() as u64;
         let (decision, reason) = match (self.method.is_cut(), refused) {
             (true, _) => (Limited, "filling was cut short: other points are path traced"),
             (false, 1..) => (Limited, "not enough memory: other points are path traced"),
