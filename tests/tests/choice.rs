@@ -101,6 +101,7 @@ fn choices() -> String {
     let mut text = format!("# {SIZE} x {SIZE} pixels, seed 0; predicted relMSE, rounded\n");
     for scene in SCENES {
         for spp in BUDGETS {
+            let max_depth = scene.max_depth;
             scene.with(|scene| {
                 // The choice alone: the picture ends after its first round.
                 let stopped = AtomicBool::new(false);
@@ -108,6 +109,7 @@ fn choices() -> String {
                 let settings = Settings {
                     width: SIZE,
                     height: SIZE,
+                    max_depth,
                     level: Level::BASELINE,
                     stop: Stop { spp: Some(spp), ..Stop::default() },
                     ..Settings::default()
