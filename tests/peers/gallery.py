@@ -1,4 +1,4 @@
-"""Pictures and error curves of all methods on three scenes of the repository, for docs/methods.md.
+"""Pictures and error curves of nine methods on three scenes of the repository, for docs/methods.md.
 
     HALFLIGHT=program python3 tests/peers/gallery.py [--seconds 8] [--reference-seconds 240]
 
@@ -98,6 +98,8 @@ def main():
                 with open(report / "curve.csv") as file:
                     points = [(float(row["seconds"]), float(row["reference_relmse"])) for row in csv.DictReader(file)]
                 curves[method] = [point for point in points if min(point) > 0]
+                if not curves[method]:
+                    raise RuntimeError(f"{name} {method}: no point of the curve")
                 print(f"{name} {method}: relMSE {curves[method][-1][1]:.2e}", flush=True)
         picture = np.vstack([np.hstack(rows[i : i + 3]) for i in (0, 3, 6)])
         write_png(GALLERY / f"methods-{name}.png", exposure * picture)

@@ -129,13 +129,14 @@ def table(rows, budget):
             if logs:
                 error[method] = math.exp(sum(logs) / len(logs))
         others = [value for method, value in error.items() if method != "auto"]
-        best = min(others)
+        best = min(others, default=float("nan"))
         cells = [("**{:.1e}**" if error.get(m) == best else "{:.1e}").format(error[m]) if m in error else "–" for m in methods]
         chosen = {row["chosen"] for row in rows if (row["scene"], row["method"]) == (scene, "auto")}
         regret = error["auto"] / best if "auto" in error else float("nan")
-        regrets.append(regret)
+        regrets += [regret] if regret == regret else []
         print(f"| {scene} | " + " | ".join(cells) + f" | {', '.join(sorted(chosen))} | {regret:.2f} |")
-    print(f"\nGeometric mean of the regret: {math.exp(sum(map(math.log, regrets)) / len(regrets)):.2f}")
+    if regrets:
+        print(f"\nGeometric mean of the regret: {math.exp(sum(map(math.log, regrets)) / len(regrets)):.2f}")
 
 
 if __name__ == "__main__":

@@ -91,7 +91,7 @@ def scene(name, folder):
     if name != "point":
         obj.quads(corners((-0.25, -0.25, 1.26002), (0.25, 0.25, 1.28002)), [
             ("white", (0, 3, 2, 1)), ("white", (3, 0, 4, 7)), ("white", (1, 2, 6, 5)), ("white", (4, 5, 6, 7)),
-            ("lamp" if name == "ceiling" else "white", (0, 1, 5, 4)[::-1])])
+            ("lamp" if name == "ceiling" else "white", (0, 1, 5, 4))])
     if name == "ceiling":
         middle = [(BOX_MIN[i] + BOX_MAX[i]) / 2 for i in (0, 1)]
         obj.sphere((*middle, BOX_MIN[2] + 0.8), 0.8, "mirror")

@@ -71,6 +71,15 @@ fn paths_are_chosen_where_light_comes_directly_and_have_their_bits() {
 }
 
 #[test]
+fn path_tracing_renders_within_a_memory_limit_that_the_chosen_method_exceeds() {
+    let room = room_with_up_light();
+    let paths = render(&room.scene(), Method::Path, SIZE, SPP, |_| ());
+    let limit = Some(paths.memory_peak + paths.memory_peak / 64);
+    let result = chosen(&room, |settings| settings.memory = limit);
+    assert!(result.spp == SPP && result.memory_peak <= limit.unwrap_or(0), "{}", result.method.name());
+}
+
+#[test]
 fn the_choice_follows_from_scene_and_settings_on_any_number_of_threads() {
     let room = room_with_up_light();
     let [one, three] = [1, 3].map(|threads| chosen(&room, |settings| settings.threads = Some(threads)));
@@ -94,7 +103,7 @@ fn a_resumed_film_goes_on_with_the_method_that_was_chosen() {
 }
 
 /// Samples per pixel of the pictures of the snapshot.
-const BUDGETS: [u32; 3] = [4, 64, 1024];
+const BUDGETS: [u32; 3] = [16, 64, 1024];
 
 /// Chosen method and predicted errors of each scene of the table.
 fn choices() -> String {

@@ -1,9 +1,11 @@
 //! Choice of a method by predicted error.
 //!
-//! A trial path traces a few tiles of the picture twice: once for all light, and once for the light that
-//! stays with paths where an irradiance cache knows the rest. It gives the noise and the work of both, in
-//! rays rather than seconds, so that the choice follows from scene, settings and seed alone. The difference
-//! of the noises is that of the light which records gather, each with many rays.
+//! A trial renders 16 tiles with four samples per pixel: by path tracing, and by path tracing in which an
+//! irradiance cache supplies the indirect light of diffuse surfaces. It measures the variance and the rays of
+//! both. The difference of the variances, divided by the gather rays of a record, is the noise of interpolated
+//! light; it includes the difference of the estimators of direct light. Work is counted in rays and not in
+//! seconds: the choice follows from scene, settings, seed, memory and, where time is limited, the number of
+//! threads.
 
 use super::caustics::{self, CausticPathTracing};
 use super::executor::{Executor, Passed};
@@ -24,29 +26,42 @@ const SAMPLES: u32 = 4;
 const BLOCK: usize = 64;
 const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
-/// Rays per second and thread by which a time is work. The choice depends on it, and on no clock.
+/// Rays per second and thread, by which a time limit becomes work. No clock is read.
 const RAYS_PER_SECOND: f64 = 3e6;
+
+/// Rays of a trial, its greatest fraction of the work, and rays of a sample before a trial has counted them.
+const TRIAL_RAYS: f64 = 2.5e5;
+const TRIAL_SHARE: f64 = 0.25;
+const RAYS_PER_SAMPLE: f64 = 8.0;
+
+/// Rays of the pilot of counts, and its greatest fraction of the work.
+const PILOT_RAYS: f64 = 5e5;
+const PILOT_SHARE: f64 = 0.04;
 
 /// Work of a ray of cached paths, with its share of lookups and light samples, and of a gather ray.
 const CACHED_RAY: f64 = 1.8;
 const GATHER_RAY: f64 = 1.5;
 
-/// Gather rays for each pixel of a picture with one pixel; they fall with this power of the pixels.
-/// Measured on 17 scenes at 576 and 4096 pixels, within a factor of two.
+/// Gather rays for each pixel of a picture of one pixel, with [`USUAL_RAYS`] for a record; they fall with this
+/// power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a factor of two.
 const GATHER_RAYS: f64 = 5700.0;
 const GATHER_POWER: f64 = 0.4;
+const USUAL_RAYS: f64 = 256.0;
 
-/// Records that together know the light of a point.
+/// Records whose mean a lookup returns.
 const RECORDS: f64 = 6.0;
 
-/// relMSE of interpolation, beside the noise of records.
+/// relMSE of interpolation without noise.
 const BIAS: f64 = 5e-4;
 
-/// Fraction of the work within which caches are filled; records become wider if it is too little.
+/// Greatest fraction of the work for filling; radii grow if filling needs more.
 const FILLING: f64 = 0.44;
 
-/// Factor on the error of light paths: their pilot promises too much where paths find light rarely.
-const DOUBT: f64 = 2.0;
+/// Factor on the predicted error of light paths: their pilot underestimates light that paths seldom find.
+const LIGHT_PATHS_FACTOR: f64 = 2.0;
+
+/// Offset of relMSE, fraction of the squared mean of the picture.
+const DARK: f64 = 0.01;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
 const LEAST_GAIN: f64 = 1.2;
@@ -60,6 +75,16 @@ pub struct Goal {
     pub samples: Option<u32>,
     /// relMSE.
     pub error: Option<f64>,
+}
+
+impl Goal {
+    /// Whether a trial costs little beside a picture of so many `pixels`.
+    pub fn affords_trial(&self, pixels: usize) -> bool {
+        let time = self.seconds.map(|seconds| seconds * RAYS_PER_SECOND);
+        let samples = self.samples.map(|samples| f64::from(samples) * pixels as f64 * RAYS_PER_SAMPLE);
+        let rays = [time, samples].into_iter().flatten().fold(f64::INFINITY, f64::min);
+        rays > TRIAL_RAYS / TRIAL_SHARE
+    }
 }
 
 /// Method with the least predicted error or work.
@@ -115,6 +140,8 @@ pub struct Trial {
     pub pixels: f64,
     /// Gather rays of a record.
     pub record_rays: f64,
+    /// Parts in which the picture is rendered, each with caches of its own.
+    pub shards: f64,
 }
 
 /// Working memory of a worker.
@@ -131,13 +158,13 @@ impl Trial {
     pub fn run<F: Features>(
         context: &RenderContext,
         paths: &mut CausticPathTracing<F>,
-        record_rays: u32,
+        (record_rays, shards): (u32, u32),
         executor: &mut impl Executor,
     ) -> Result<Option<Self>, OutOfMemory> {
         // Samples that the picture does not have.
         let settings = PathSettings { seed: !context.settings.seed, ..context.settings };
         let all = RenderContext { settings, ..*context }.integrator::<F>();
-        let rest = all.with_known_irradiance();
+        let rest = all.without_cached_light();
         let reuse = paths.reuse();
         let tiles = match paths.photons() {
             None => trace((&all, &rest), executor)?,
@@ -151,8 +178,8 @@ impl Trial {
             Some(pilot) => f64::from(pilot.cost()) / f64::from(pilot.gain()).min(counts::REUSE_GAIN),
             None => 1.0,
         };
-        let (pixels, record_rays) = (context.pixels() as f64, record_rays.into());
-        Ok(Some(Self { reuse, pixels, record_rays, ..Self::of(&tiles) }))
+        let (pixels, record_rays, shards) = (context.pixels() as f64, record_rays.into(), shards.into());
+        Ok(Some(Self { reuse, pixels, record_rays, shards, ..Self::of(&tiles) }))
     }
 
     /// Noise and work of `tiles`.
@@ -163,7 +190,7 @@ impl Trial {
         let mut trial = Self::default();
         for (all, rest) in blocks().filter(|(all, _)| all.pixels > 0.0) {
             let level = all.light / all.pixels;
-            let scale = level * level + 0.01 * mean * mean;
+            let scale = level * level + DARK * mean * mean;
             for (noise, block) in trial.noise.iter_mut().zip([all, rest]).filter(|_| scale > 0.0) {
                 *noise += f64::from(SAMPLES) * block.variance / (scale * pixels);
             }
@@ -177,18 +204,19 @@ impl Trial {
     fn budget(&self, goal: &Goal) -> f64 {
         let time = goal.seconds.map(|seconds| seconds * RAYS_PER_SECOND / self.pixels);
         let samples = goal.samples.map(|samples| f64::from(samples) * self.work[0]);
-        let error = goal.error.map(|error| self.of_paths(1.0) / error);
+        let error = goal.error.map(|error| self.error_of_paths(1.0) / error);
         [time, samples, error].into_iter().flatten().fold(f64::INFINITY, f64::min)
     }
 
     /// relMSE of path tracing after so much work for each pixel.
-    pub fn of_paths(&self, work: f64) -> f64 {
+    pub fn error_of_paths(&self, work: f64) -> f64 {
         self.reuse * self.noise[0] * self.work[0] / work
     }
 
     /// relMSE with an irradiance cache after so much work for each pixel.
-    pub fn of_cache(&self, work: f64) -> f64 {
-        let filling = GATHER_RAY * GATHER_RAYS * libm::pow(self.pixels, -GATHER_POWER);
+    pub fn error_of_cache(&self, work: f64) -> f64 {
+        let of_record = self.shards * self.record_rays / USUAL_RAYS;
+        let filling = of_record * GATHER_RAY * GATHER_RAYS * libm::pow(self.pixels, -GATHER_POWER);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
         let gathered = (self.noise[0] - self.noise[1]).max(0.0) / (self.record_rays * RECORDS);
@@ -203,10 +231,13 @@ impl Trial {
     /// The method with the least error for `goal`, and the reason; light paths if their pilot ran and found a
     /// ratio of noise × work of path tracing to theirs.
     pub fn best(&self, goal: &Goal, may_have_cache: bool, light_paths: Option<f64>) -> (Best, Finding) {
+        if self.noise[0] <= 0.0 {
+            return (Best::Paths, Finding::new("method", Used, "paths show no noise"));
+        }
         let work = self.budget(goal);
-        let paths = self.of_paths(work);
-        let cache = may_have_cache.then(|| self.of_cache(work));
-        let of_light = light_paths.map(|gain| DOUBT * paths / gain.max(1e-3));
+        let paths = self.error_of_paths(work);
+        let cache = may_have_cache.then(|| self.error_of_cache(work));
+        let of_light = light_paths.map(|gain| LIGHT_PATHS_FACTOR * paths / gain.max(1e-3));
         let mut best = (Best::Paths, paths / LEAST_GAIN, "path tracing has the least error");
         let others = [
             (
@@ -232,10 +263,6 @@ impl Trial {
     }
 }
 
-/// Rays of the pilot of light paths with all of its weightings, and its greatest fraction of the work.
-const PILOT_RAYS: f64 = 5e5;
-const PILOT_SHARE: f64 = 0.04;
-
 /// Traces the tiles of a trial by both integrators.
 fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
     (all, rest): (&PathIntegrator<F, A>, &PathIntegrator<F, B>),
@@ -246,15 +273,15 @@ fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
         executor.pass(all.pilot_tasks().zip(tiles.iter_mut()), |_, (tile, out), worker| {
             let mut arena = worker.scratch.scratch();
             let pixels = arena.slice::<Pixel>(PIXELS_PER_TILE)?;
-            (out.blocks[0], out.rays[0]) = one(all, tile, &mut arena, pixels)?;
-            (out.blocks[1], out.rays[1]) = one(rest, tile, &mut arena, pixels)?;
+            (out.blocks[0], out.rays[0]) = trace_tile(all, tile, &mut arena, pixels)?;
+            (out.blocks[1], out.rays[1]) = trace_tile(rest, tile, &mut arena, pixels)?;
             Ok(Counters::default())
         })?;
     Ok(is_complete.then_some(tiles))
 }
 
 /// The blocks of a tile, and its rays.
-fn one<F: Features, E: LightEstimator<F>>(
+fn trace_tile<F: Features, E: LightEstimator<F>>(
     integrator: &PathIntegrator<F, E>,
     tile: usize,
     arena: &mut Arena,

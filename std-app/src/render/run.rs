@@ -115,23 +115,39 @@ impl WithFeatures for Render<'_> {
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
         let is_open = settings.method.is_none() && resumed.is_none();
         let mut plan = if is_open { Plan::open() } else { Plan::from(method) };
+        let mut may_fall_back = is_open;
         loop {
             let bank = Bank::new();
             let mut own = memory.within(&bank);
-            let mut renderer = match method::set_up::<F>(plan, &setup, &mut own)? {
-                Attempt::Ready(renderer) => renderer,
-                Attempt::Instead(better) => {
+            let attempt = method::set_up::<F>(plan, &setup, &mut own).and_then(|attempt| match attempt {
+                Attempt::Ready(renderer) => {
+                    let audit = Audit::new::<F>(&setup, &mut own, renderer.chosen())?;
+                    Ok(Ok((renderer, audit)))
+                }
+                Attempt::Instead(better) => Ok(Err(*better)),
+            });
+            let (mut renderer, audit) = match attempt {
+                Ok(Ok(ready)) => ready,
+                Ok(Err(better)) => {
                     memory.release(&own);
-                    plan = *better;
+                    plan = better;
                     continue;
                 }
+                // A method that was chosen may need more memory than path tracing.
+                Err(RenderError::Memory { .. }) if may_fall_back => {
+                    memory.release(&own);
+                    may_fall_back = false;
+                    plan = Method::Path.into();
+                    continue;
+                }
+                Err(error) => return Err(error),
             };
             let method = renderer.chosen();
             let picture = Picture {
                 method,
                 setup,
                 state,
-                audit: Audit::new::<F>(&setup, &mut own, method)?,
+                audit,
                 identity: identity(method),
                 resumed,
                 clock,

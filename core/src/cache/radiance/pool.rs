@@ -119,6 +119,7 @@ impl<'m> CoefficientPool<'m> {
         let offset = u32::try_from(self.used).ok()?;
         let free = self.registers.get_mut(self.used..self.used + registers(degree))?;
         let irradiance = coefficients.irradiance().to_array();
+        let irradiance = irradiance.map(|value| if value > 0.0 && value.is_finite() { value } else { 0.0 });
         let (free_values, free_slopes) = free.split_at_mut(3 * values);
         let rows = free_values.chunks_exact_mut(values).zip(free_slopes.chunks_exact_mut(2 * slopes));
         for (channel, (row, pair)) in rows.enumerate() {
@@ -150,7 +151,7 @@ impl<'m> CoefficientPool<'m> {
             .compute(level);
         Dots { rows: of_slopes, weights: weights.0.get(..slopes).unwrap_or_default(), out: &mut slope }
             .compute(level);
-        let step = delta / record.unit;
+        let step = if record.unit > 0.0 { delta / record.unit } else { Vec2::ZERO };
         Rgb::from_array(core::array::from_fn(|channel| {
             let here = own[channel].max(0.0);
             let there = own[channel] + step.dot(Vec2::new(slope[2 * channel], slope[2 * channel + 1]));

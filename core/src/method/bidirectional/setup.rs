@@ -19,10 +19,10 @@ use crate::transport::photon_mapping::deposit::PhotonFilter;
 /// Pixels for each light path, where their number is left open; one where vertices are merged.
 const PIXELS_PER_LIGHT_PATH: usize = 2;
 
-/// Light paths of a sample at most.
+/// Tasks of light paths of a sample at most.
 const MOST_TASKS: usize = 1024;
 
-/// Radius of merges of the first sample at most, in pixels, where they bring nearly all light.
+/// Greatest radius of merges of the first sample, in pixels: where they bring 72 % of the light or more.
 const WIDEST_RADIUS: f64 = 4.0;
 
 /// Ratio of the light of merges and splats to all other from which on radii grow.

@@ -33,8 +33,8 @@ const BASE_WEIGHT: f32 = 0.6;
 pub enum CacheView<'a> {
     /// Frozen caches of even and of odd samples.
     Pair([&'a IrradianceCache<'a>; 2]),
-    /// Caches that know the light of every point, which is none: the measure of what stays with paths.
-    Known,
+    /// A cache that is valid at every point and returns zero: paths then find the light that no cache supplies.
+    Everywhere,
     /// One cache with its present records. The first valid record is enough for gather rays, which are
     /// averaged.
     UnderConstruction(&'a IrradianceCache<'a>),
@@ -63,7 +63,7 @@ impl CacheView<'_> {
                     exposed.iter_mut().zip(reach).for_each(|(exposed, reach)| *exposed = exposed.max(reach));
                 }
             }
-            CacheView::Known => {
+            CacheView::Everywhere => {
                 let known = CachedIrradiance { irradiance: Rgb::ZERO, edge_moment: Rgb::ZERO, shining: 0.0 };
                 queries.for_each(|(i, _)| found[i] = Some(known));
             }
@@ -97,7 +97,7 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {
         match self {
             // With cut-outs each path has memory for one shadow ray.
-            CacheView::Pair(_) | CacheView::Known if !context.has_cutouts => LIGHT_SAMPLES,
+            CacheView::Pair(_) | CacheView::Everywhere if !context.has_cutouts => LIGHT_SAMPLES,
             _ => 1,
         }
     }
@@ -180,9 +180,9 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         self.with_estimator(CacheView::Pair(caches))
     }
 
-    /// This path tracer without the light that caches would know.
-    pub fn with_known_irradiance(&self) -> PathIntegrator<'a, F, CacheView<'a>> {
-        self.with_estimator(CacheView::Known)
+    /// This path tracer without the light that a complete cache would supply.
+    pub fn without_cached_light(&self) -> PathIntegrator<'a, F, CacheView<'a>> {
+        self.with_estimator(CacheView::Everywhere)
     }
 
     /// This path tracer for gather rays, with the records that `cache` has so far.

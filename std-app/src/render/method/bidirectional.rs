@@ -57,10 +57,10 @@ fn beside_paths<'a: 'm, 'm, F: Features>(
     Ok(match paths {
         _ if choice.counts.light_paths > 0.0 => Attempt::Instead(Plan::with_counts(method, choice).into()),
         Attempt::Ready(renderer) => {
-            Attempt::Ready(Box::new(Prepared { renderer, chosen: method, findings: choice.findings() }))
+            Attempt::Ready(Box::new(Prepared { renderer, reported: method, findings: choice.findings() }))
         }
         Attempt::Instead(plan) => {
-            Attempt::Instead(Box::new(Plan { chosen: method, findings: choice.findings(), ..*plan }))
+            Attempt::Instead(Box::new(Plan { reported: method, findings: choice.findings(), ..*plan }))
         }
     })
 }

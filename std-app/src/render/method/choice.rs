@@ -4,7 +4,7 @@
 use super::{Method, Plan, RenderSetup, bidirectional};
 use crate::render::memory::Memory;
 use crate::render::threads::Threads;
-use crate::render::{RenderError, Settings, Stop};
+use crate::render::{RenderError, Stop};
 use halflight_core::bsdf::Features;
 use halflight_core::census::Census;
 use halflight_core::findings::Finding;
@@ -18,7 +18,7 @@ pub(super) struct Chosen<'a, F> {
     pub(super) finding: Finding,
 }
 
-/// The method that suits the picture, beside `paths`. `None` where the time is over.
+/// The method that suits the picture, besides `paths`. `None` where time is too short for a trial.
 pub(super) fn choose<'a, F: Features>(
     paths: &mut CausticPathTracing<F>,
     setup: &RenderSetup,
@@ -26,17 +26,22 @@ pub(super) fn choose<'a, F: Features>(
     executor: &mut Threads,
 ) -> Result<Option<Chosen<'a, F>>, RenderError> {
     let (context, settings) = (setup.context(), setup.settings);
-    let rays = settings.cache.strata().pow(2);
-    let Some(trial) = Trial::run(&context, paths, rays, executor)? else { return Ok(None) };
     let goal = goal(&settings.stop, setup.workers.count());
-    let may_have_cache = may_have_cache(setup);
+    if !goal.affords_trial(context.pixels()) {
+        return Ok(None);
+    }
+    let records = (settings.cache.strata().pow(2), settings.shard.count);
+    let Some(trial) = Trial::run(&context, paths, records, executor)? else { return Ok(None) };
+    let is_audited = settings.audit.is_none_or(|share| share > 0.0);
     let light_paths = match trial.affords_light_paths(&goal) {
         true => bidirectional::choose::<F>(setup, memory, &settings.bidirectional)?,
         false => None,
     };
+    // Merges are biased, as caches are.
     let light_paths = light_paths.map(|choice| choice.beside(&paths.findings()));
+    let light_paths = light_paths.filter(|choice| is_audited || !choice.counts.merging);
     let gain = light_paths.filter(|choice| choice.counts.light_paths > 0.0).and_then(|choice| choice.gain);
-    let (best, finding) = trial.best(&goal, may_have_cache, gain.map(f64::from));
+    let (best, finding) = trial.best(&goal, is_audited && may_have_cache(setup), gain.map(f64::from));
     let instead = match (best, light_paths) {
         (Best::Paths, _) | (Best::LightPaths, None) => None,
         (Best::Cache, _) => Some(Method::IrradianceCache.into()),
@@ -51,11 +56,8 @@ fn goal(stop: &Stop, threads: usize) -> Goal {
     Goal { seconds: stop.seconds.map(|seconds| seconds * threads as f64), samples, error: stop.error }
 }
 
-/// Whether a cache could know light of the scene, and its bias would be measured.
+/// Whether a cache could supply light of the scene.
 fn may_have_cache(setup: &RenderSetup) -> bool {
-    let Settings { audit, max_depth, .. } = setup.settings;
     let surfaces = Census::of(setup.scene).surfaces;
-    audit.is_none_or(|share| share > 0.0)
-        && max_depth.is_none_or(|depth| depth > 2)
-        && surfaces.diffuse + surfaces.glossy > 0
+    setup.settings.max_depth.is_none_or(|depth| depth > 2) && surfaces.diffuse + surfaces.glossy > 0
 }

@@ -49,8 +49,8 @@ use prepared::Prepared;
 /// A method to set up, with the decisions of prepasses that have run.
 pub(super) struct Plan<'a, F> {
     method: Method,
-    /// The method in whose place it renders.
-    chosen: Method,
+    /// Method to report: the requested one where path tracing replaces it.
+    reported: Method,
     /// Whether prepasses may choose another method.
     is_open: bool,
     /// Path tracing without caustic photons, by its prepass.
@@ -64,7 +64,7 @@ pub(super) struct Plan<'a, F> {
 impl<F> From<Method> for Plan<'_, F> {
     fn from(method: Method) -> Self {
         let findings = Findings::default();
-        Self { method, chosen: method, is_open: false, paths: None, counts: None, findings }
+        Self { method, reported: method, is_open: false, paths: None, counts: None, findings }
     }
 }
 
@@ -95,7 +95,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     memory: &mut Memory<'m>,
 ) -> Result<Attempt<'a, 'm, F>, RenderError> {
     let (context, settings, method) = (&setup.context(), setup.settings, plan.method);
-    let (chosen, findings) = (plan.chosen, plan.findings);
+    let (reported, findings) = (plan.reported, plan.findings);
     let renderer: Box<dyn Renderer + 'm> = match method {
         Method::Path => match path::set_up(plan, setup, memory)? {
             Attempt::Ready(renderer) => renderer,
@@ -139,7 +139,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     };
     let renderer: Box<dyn Renderer + 'm> = match findings == Findings::default() {
         true => renderer,
-        false => Box::new(Prepared { renderer, chosen, findings }),
+        false => Box::new(Prepared { renderer, reported, findings }),
     };
     Ok(Attempt::Ready(renderer))
 }
@@ -174,7 +174,7 @@ pub(super) type Borrower<'b> = dyn FnMut(Option<CausticMerging>) -> Result<(), R
 
 /// A method at work on one scene. It owns its structures, but not the film.
 pub(super) trait Renderer {
-    /// The method; a prepass may have chosen another one than the settings.
+    /// The method to report in films and results.
     fn chosen(&self) -> Method;
 
     /// One round: brings the tiles of the film to the target, or less if the round is cut.

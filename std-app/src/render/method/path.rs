@@ -67,7 +67,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     }
     let renderer = Box::new(Adapter::<F, _>::with(setup, (Method::Path, scratch), method));
     Ok(Attempt::Ready(match plan.is_open {
-        true => Box::new(Prepared { renderer, chosen: Method::Path, findings }),
+        true => Box::new(Prepared { renderer, reported: Method::Path, findings }),
         false => renderer,
     }))
 }

@@ -9,16 +9,16 @@ use crate::render::workers::Workers;
 use crate::save::Patience;
 use halflight_core::findings::Findings;
 
-/// The method, under the name of the one in whose place it renders.
+/// The method, and the one to report: the requested one where path tracing replaces it.
 pub(super) struct Prepared<'m> {
     pub(super) renderer: Box<dyn Renderer + 'm>,
-    pub(super) chosen: Method,
+    pub(super) reported: Method,
     pub(super) findings: Findings,
 }
 
 impl Renderer for Prepared<'_> {
     fn chosen(&self) -> Method {
-        self.chosen
+        self.reported
     }
 
     fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
