@@ -92,11 +92,11 @@ fn a_resumed_film_goes_on_with_the_method_that_was_chosen() {
     let room = room_with_up_light();
     let path = std::env::temp_dir().join(format!("halflight-choice-{}", std::process::id()));
     let keep = Checkpoint { path: path.clone(), every: f64::INFINITY };
-    let whole = chosen(&room, |_| ());
-    let begun = chosen(&room, |settings| {
-        (settings.checkpoint, settings.stop.spp) = (Some(keep), Some(8));
+    let whole = chosen(&room, |settings| settings.stop.spp = Some(2 * SPP));
+    let begun = chosen(&room, |settings| settings.checkpoint = Some(keep));
+    let resumed = chosen(&room, |settings| {
+        (settings.resume, settings.stop.spp) = (Some(path.clone()), Some(2 * SPP));
     });
-    let resumed = chosen(&room, |settings| settings.resume = Some(path.clone()));
     std::fs::remove_file(path).expect("a film");
     assert_eq!([begun.method, resumed.method], [whole.method; 2]);
     assert!(resumed.image.pixels == whole.image.pixels);
