@@ -74,9 +74,9 @@ fn paths_are_chosen_where_light_comes_directly_and_have_their_bits() {
 fn path_tracing_renders_within_a_memory_limit_that_the_chosen_method_exceeds() {
     let room = room_with_up_light();
     let paths = render(&room.scene(), Method::Path, SIZE, SPP, |_| ());
-    let limit = Some(paths.memory_peak + paths.memory_peak / 64);
-    let result = chosen(&room, |settings| settings.memory = limit);
-    assert!(result.spp == SPP && result.memory_peak <= limit.unwrap_or(0), "{}", result.method.name());
+    let limit = paths.memory_peak + paths.memory_peak / 64;
+    let result = chosen(&room, |settings| settings.memory = Some(limit));
+    assert!(result.spp == SPP && result.memory_peak <= limit, "{}", result.method.name());
 }
 
 #[test]
