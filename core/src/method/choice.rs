@@ -10,11 +10,12 @@
 use super::caustics::{self, CausticPathTracing};
 use super::executor::{Executor, Passed};
 use super::{RenderContext, counts};
+use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 use crate::findings::Decision::Used;
 use crate::findings::{Finding, Value};
-use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::memory::{Footprint, OutOfMemory};
 use crate::transport::path::reuse_pilot::PILOT_TILES;
 use crate::transport::path::{LightEstimator, WAVE};
 use crate::transport::{Counters, PathIntegrator, PathSettings};
@@ -22,9 +23,8 @@ use crate::transport::{Counters, PathIntegrator, PathSettings};
 /// Samples of a pixel in a trial.
 const SAMPLES: u32 = 4;
 
-/// Pixels of a block, over whose light noise is relative, and blocks of a tile.
+/// Pixels of a block.
 const BLOCK: usize = 64;
-const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
 /// Rays per second and thread, by which a time limit becomes work. No clock is read.
 const RAYS_PER_SECOND: f64 = 3e6;
@@ -49,10 +49,10 @@ const GATHER_POWER: f64 = 0.4;
 const USUAL_RAYS: f64 = 256.0;
 
 /// Records whose mean a lookup returns.
-const RECORDS: f64 = 6.0;
+const RECORDS: f64 = 20.0;
 
 /// relMSE of interpolation without noise.
-const BIAS: f64 = 5e-4;
+const BIAS: f64 = 3e-4;
 
 /// Greatest fraction of the work for filling; radii grow if filling needs more.
 const FILLING: f64 = 0.44;
@@ -64,7 +64,7 @@ const LIGHT_PATHS_FACTOR: f64 = 2.0;
 const DARK: f64 = 0.01;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
-const LEAST_GAIN: f64 = 1.2;
+const LEAST_GAIN: f64 = 1.4;
 
 /// End of a picture: the first of these that holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -98,39 +98,40 @@ pub enum Best {
     LightPaths,
 }
 
-/// Sums over the pixels of a block.
-#[derive(Clone, Copy, Debug, Default)]
-struct Block {
-    pixels: f64,
-    /// Mean of the channels.
-    light: f64,
-    /// Variance of the mean of the samples.
-    variance: f64,
-}
-
-impl Block {
-    fn of(pixels: &[Pixel]) -> Self {
-        let mut block = Self::default();
-        for pixel in pixels.iter().filter(|pixel| pixel.count() > 0) {
-            block.pixels += 1.0;
-            block.light += f64::from(pixel.mean().element_sum()) / 3.0;
-            block.variance += f64::from(pixel.variance().element_sum()) / 3.0;
-        }
-        block
-    }
-}
-
-/// A tile by paths that find all light, and by those that find what records do not know.
+/// Sums over a tile: of all light by path tracing, and of the light that no cache supplies.
 #[derive(Clone, Copy, Default)]
 struct TileTrial {
-    blocks: [[Block; BLOCKS]; 2],
+    pixels: f64,
+    /// Variance of the mean of the samples, relative to the light of pixel or block.
+    variance: [f64; 2],
     rays: [f64; 2],
+}
+
+impl TileTrial {
+    /// Adds a block of pixels of a picture with this `mean` radiance; `rest` are the same pixels without the
+    /// light of caches.
+    fn add(&mut self, all: &[Pixel], rest: &[Pixel], mean: f64) {
+        let brightness = |light: Rgb| f64::from(light.element_sum()) / 3.0;
+        let sampled = || all.iter().zip(rest).filter(|(all, _)| all.count() > 0);
+        let pixels = sampled().count() as f64;
+        let level = sampled().map(|(all, _)| brightness(all.mean())).sum::<f64>() / pixels.max(1.0);
+        for (all, rest) in sampled() {
+            // A lamp is bright in both halves, a firefly in one.
+            let least = brightness(all.even.mean()).min(brightness(all.odd.mean()));
+            let scale = level.max(least).powi(2) + DARK * mean * mean;
+            if scale > 0.0 {
+                let variance = [all, rest].map(|pixel| brightness(pixel.variance()) / scale);
+                self.variance = [0, 1].map(|i| self.variance[i] + variance[i]);
+            }
+        }
+        self.pixels += pixels;
+    }
 }
 
 /// Noise and work of samples of a picture, each of all light and of the light that records do not know.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Trial {
-    /// Variance of a sample relative to the light of its block.
+    /// Variance of a sample relative to the light of its pixel or block.
     pub noise: [f64; 2],
     /// Rays of a sample.
     pub work: [f64; 2],
@@ -146,7 +147,7 @@ pub struct Trial {
 
 /// Working memory of a worker.
 pub fn scratch<F: Features>() -> Footprint {
-    caustics::scratch::<F>().slice::<Pixel>(PIXELS_PER_TILE)
+    caustics::scratch::<F>().slice::<Pixel>(PIXELS_PER_TILE).slice::<Pixel>(PIXELS_PER_TILE)
 }
 
 impl Trial {
@@ -165,12 +166,14 @@ impl Trial {
         let settings = PathSettings { seed: !context.settings.seed, ..context.settings };
         let all = RenderContext { settings, ..*context }.integrator::<F>();
         let rest = all.without_cached_light();
-        let reuse = paths.reuse();
+        let (reuse, mean) = (paths.reuse(), f64::from(paths.mean_radiance(executor)?));
         let tiles = match paths.photons() {
-            None => trace((&all, &rest), executor)?,
+            None => trace((&all, &rest), mean, executor)?,
             Some(photons) => photons.lend(|photons| match photons {
-                Some(photons) => trace((&all.with_caustics(photons), &rest.with_caustics(photons)), executor),
-                None => trace((&all, &rest), executor),
+                Some(photons) => {
+                    trace((&all.with_caustics(photons), &rest.with_caustics(photons)), mean, executor)
+                }
+                None => trace((&all, &rest), mean, executor),
             })??,
         };
         let Some(tiles) = tiles else { return Ok(None) };
@@ -184,20 +187,14 @@ impl Trial {
 
     /// Noise and work of `tiles`.
     fn of(tiles: &[TileTrial]) -> Self {
-        let blocks = || tiles.iter().flat_map(|tile| tile.blocks[0].iter().zip(&tile.blocks[1]));
-        let pixels = blocks().map(|(all, _)| all.pixels).sum::<f64>().max(1.0);
-        let mean = blocks().map(|(all, _)| all.light).sum::<f64>() / pixels;
-        let mut trial = Self::default();
-        for (all, rest) in blocks().filter(|(all, _)| all.pixels > 0.0) {
-            let level = all.light / all.pixels;
-            let scale = level * level + DARK * mean * mean;
-            for (noise, block) in trial.noise.iter_mut().zip([all, rest]).filter(|_| scale > 0.0) {
-                *noise += f64::from(SAMPLES) * block.variance / (scale * pixels);
-            }
+        let samples = f64::from(SAMPLES);
+        let pixels = tiles.iter().map(|tile| tile.pixels).sum::<f64>().max(1.0);
+        let sum = |of: &dyn Fn(&TileTrial) -> f64| tiles.iter().map(of).sum::<f64>();
+        Self {
+            noise: [0, 1].map(|i| samples * sum(&|tile| tile.variance[i]) / pixels),
+            work: [0, 1].map(|i| sum(&|tile| tile.rays[i]) / (samples * pixels)),
+            ..Self::default()
         }
-        let rays = |i: usize| tiles.iter().map(|tile| tile.rays[i]).sum::<f64>();
-        trial.work = [0, 1].map(|i| rays(i) / (f64::from(SAMPLES) * pixels));
-        trial
     }
 
     /// Work for each pixel that reaches `goal` by path tracing, in rays.
@@ -263,33 +260,26 @@ impl Trial {
     }
 }
 
-/// Traces the tiles of a trial by both integrators.
+/// Traces the tiles of a trial by both integrators, in a picture with this `mean` radiance.
 fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
     (all, rest): (&PathIntegrator<F, A>, &PathIntegrator<F, B>),
+    mean: f64,
     executor: &mut impl Executor,
 ) -> Result<Option<[TileTrial; PILOT_TILES]>, OutOfMemory> {
     let mut tiles = [TileTrial::default(); PILOT_TILES];
     let Passed { is_complete, .. } =
         executor.pass(all.pilot_tasks().zip(tiles.iter_mut()), |_, (tile, out), worker| {
             let mut arena = worker.scratch.scratch();
-            let pixels = arena.slice::<Pixel>(PIXELS_PER_TILE)?;
-            (out.blocks[0], out.rays[0]) = trace_tile(all, tile, &mut arena, pixels)?;
-            (out.blocks[1], out.rays[1]) = trace_tile(rest, tile, &mut arena, pixels)?;
+            let pixels = arena.slice::<Pixel>(2 * PIXELS_PER_TILE)?;
+            pixels.fill(Pixel::default());
+            let (of_all, of_rest) = pixels.split_at_mut(PIXELS_PER_TILE);
+            let counters = [
+                all.run(tile, 0..SAMPLES, WAVE, &mut arena, of_all)?,
+                rest.run(tile, 0..SAMPLES, WAVE, &mut arena, of_rest)?,
+            ];
+            out.rays = counters.map(|counters| counters.all_rays() as f64);
+            of_all.chunks(BLOCK).zip(of_rest.chunks(BLOCK)).for_each(|(all, rest)| out.add(all, rest, mean));
             Ok(Counters::default())
         })?;
     Ok(is_complete.then_some(tiles))
-}
-
-/// The blocks of a tile, and its rays.
-fn trace_tile<F: Features, E: LightEstimator<F>>(
-    integrator: &PathIntegrator<F, E>,
-    tile: usize,
-    arena: &mut Arena,
-    pixels: &mut [Pixel],
-) -> Result<([Block; BLOCKS], f64), OutOfMemory> {
-    pixels.fill(Pixel::default());
-    let counters = integrator.run(tile, 0..SAMPLES, WAVE, arena, pixels)?;
-    let mut blocks = [Block::default(); BLOCKS];
-    blocks.iter_mut().zip(pixels.chunks(BLOCK)).for_each(|(block, pixels)| *block = Block::of(pixels));
-    Ok((blocks, counters.all_rays() as f64))
 }

@@ -121,6 +121,14 @@ impl<'a, F: Features> CausticPathTracing<'a, F> {
         self.paths.reuse()
     }
 
+    /// The mean radiance of the picture by the pilot of paths.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the executor's scratch is too small.
+    pub fn mean_radiance(&mut self, executor: &mut impl Executor) -> Result<f32, OutOfMemory> {
+        self.paths.mean_radiance(executor)
+    }
+
     /// Statistics of its photon maps, if it has some.
     pub fn statistics(&self) -> Option<PhotonUse> {
         self.photons.as_ref().map(|photons| photons.statistics())
