@@ -7,8 +7,8 @@ use bytemuck::{Pod, Zeroable};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
-/// Largest alpha of a coat whose transmittance follows the fit, and largest reflectance at normal incidence of
-/// a coat of Schlick that does at any alpha.
+/// Largest alpha of a coat whose transmittance follows the fit, and largest reflectance at normal incidence
+/// of a coat of Schlick that does at any alpha.
 const MAX_FITTED_ALPHA: f32 = 0.35;
 const MAX_FITTED_SPECULAR: f32 = 0.1;
 

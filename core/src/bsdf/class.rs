@@ -28,8 +28,8 @@ impl Bsdf {
         matches!(self, Bsdf::Diffuse(_)) || self.base().max_element() >= MIN_BASE_ALBEDO
     }
 
-    /// True if a coat, rough or smooth, covers such a component, and records may supply its light: two moments
-    /// of the incident light determine the light that the coat transmits.
+    /// True if a coat, rough or smooth, covers such a component, and records may supply its light: two
+    /// moments of the incident light determine the light that the coat transmits.
     #[inline]
     pub(crate) fn has_coated_base(&self) -> bool {
         matches!(self, Bsdf::Glossy(_) | Bsdf::Plastic(_)) && self.has_diffuse() && self.has_fitted_coat()

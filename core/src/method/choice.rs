@@ -2,10 +2,10 @@
 //!
 //! A trial renders 16 tiles with four samples per pixel: by path tracing, and by path tracing in which an
 //! irradiance cache supplies the indirect light of diffuse surfaces. It measures the variance and the rays of
-//! both. The difference of the variances, divided by the gather rays of a record, is the noise of interpolated
-//! light; it includes the difference of the estimators of direct light. Work is counted in rays and not in
-//! seconds: the choice follows from scene, settings, seed, memory and, where time is limited, the number of
-//! threads.
+//! both. The difference of the variances, divided by the gather rays of a record, is the noise of
+//! interpolated light; it includes the difference of the estimators of direct light. Work is counted in rays
+//! and not in seconds: the choice follows from scene, settings, seed, memory and, where time is limited, the
+//! number of threads.
 
 use super::caustics::{self, CausticPathTracing};
 use super::executor::{Executor, Passed};
@@ -42,8 +42,8 @@ const PILOT_SHARE: f64 = 0.04;
 const CACHED_RAY: f64 = 1.8;
 const GATHER_RAY: f64 = 1.5;
 
-/// Gather rays for each pixel of a picture of one pixel, with [`USUAL_RAYS`] for a record; they fall with this
-/// power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a factor of two.
+/// Gather rays for each pixel of a picture of one pixel, with [`USUAL_RAYS`] for a record; they fall with
+/// this power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a factor of two.
 const GATHER_RAYS: f64 = 5700.0;
 const GATHER_POWER: f64 = 0.4;
 const USUAL_RAYS: f64 = 256.0;

@@ -1,11 +1,11 @@
 //! Transmittance of a coat, fitted as T(c) ≈ t₀ + t₅ (1 - c)⁵ by least squares under 2c dc, so that the light
 //! that the coat lets through to its base follows from two integrals of the incident light.
 //!
-//! The fit is linear in T. With the moments a = ∫ 2c T dc and b = ∫ 2c (1 - c)⁵ T dc it is
-//! t₅ = (b - a / 21) / (1/66 - 1/441) and t₀ = a - t₅ / 21; the fit keeps a and b. It is exact for the smooth
-//! coat of Schlick. For dielectrics of alpha up to 0.35 the error in light of random bands is at most 0.5 %.
-//! The shadowing of rougher microfacets dims T over all angles, which (1 - c)⁵ does not follow: at alpha 1 the
-//! fit is 14 % too bright at c = 0.5.
+//! The fit is linear in T. With the moments a = ∫ 2c T dc and b = ∫ 2c (1 - c)⁵ T dc it is t₅ = (b - a / 21)
+//! / (1/66 - 1/441) and t₀ = a - t₅ / 21; the fit keeps a and b. It is exact for the smooth coat of Schlick.
+//! For dielectrics of alpha up to 0.35 the error in light of random bands is at most 0.5 %. The shadowing of
+//! rougher microfacets dims T over all angles, which (1 - c)⁵ does not follow: at alpha 1 the fit is 14 % too
+//! bright at c = 0.5.
 
 use super::{AMPLITUDES, COSINES, Place, ROUGHNESSES, STEP, amplitude, data, lerp, roughness};
 use crate::bsdf::{fresnel, sqrt};

@@ -33,7 +33,8 @@ const BASE_WEIGHT: f32 = 0.6;
 pub enum CacheView<'a> {
     /// Frozen caches of even and of odd samples.
     Pair([&'a IrradianceCache<'a>; 2]),
-    /// A cache that is valid at every point and returns zero: paths then find the light that no cache supplies.
+    /// A cache that is valid at every point and returns zero: paths then find the light that no cache
+    /// supplies.
     Everywhere,
     /// One cache with its present records. The first valid record is enough for gather rays, which are
     /// averaged.
@@ -173,9 +174,9 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// This path tracer with caches of indirect light at diffuse vertices and bases of coats with a valid record: even samples
-    /// use the first, odd samples the second. With a limit of depth only the first vertex of a path does,
-    /// since records do not store their distance from the camera.
+    /// This path tracer with caches of indirect light at diffuse vertices and bases of coats with a valid
+    /// record: even samples use the first, odd samples the second. With a limit of depth only the first
+    /// vertex of a path does, since records do not store their distance from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> PathIntegrator<'a, F, CacheView<'a>> {
         self.with_estimator(CacheView::Pair(caches))
     }

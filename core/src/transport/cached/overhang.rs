@@ -231,8 +231,8 @@ impl BoxVisitor for Search {
     }
 }
 
-/// First and last sector of a convex figure with these corners, which does not contain the origin; one more on
-/// each side, since a tilted probe may hit the adjacent one. Numbers below 0 and above 15 wrap around.
+/// First and last sector of a convex figure with these corners, which does not contain the origin; one more
+/// on each side, since a tilted probe may hit the adjacent one. Numbers below 0 and above 15 wrap around.
 fn sectors<const N: usize>(corners: [Vec2; N]) -> [i32; 2] {
     let sectors = corners.map(Record::sector);
     // No two corners are half a circle apart.
