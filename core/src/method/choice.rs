@@ -118,7 +118,8 @@ impl TileTrial {
         for (all, rest) in sampled() {
             // A lamp is bright in both halves, a firefly in one.
             let least = brightness(all.even.mean()).min(brightness(all.odd.mean()));
-            let scale = level.max(least).powi(2) + DARK * mean * mean;
+            let own = level.max(least);
+            let scale = own * own + DARK * mean * mean;
             if scale > 0.0 {
                 let variance = [all, rest].map(|pixel| brightness(pixel.variance()) / scale);
                 self.variance = [0, 1].map(|i| self.variance[i] + variance[i]);
