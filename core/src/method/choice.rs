@@ -27,7 +27,7 @@ const SAMPLES: u32 = 4;
 const BLOCK: usize = 64;
 
 /// Rays per second and thread, by which a time limit becomes work. No clock is read.
-const RAYS_PER_SECOND: f64 = 3e6;
+const RAYS_PER_SECOND: f64 = 6e6;
 
 /// Rays of a trial, its greatest fraction of the work, and rays of a sample before a trial has counted them.
 const TRIAL_RAYS: f64 = 2.5e5;
@@ -36,7 +36,7 @@ const RAYS_PER_SAMPLE: f64 = 8.0;
 
 /// Rays of the pilot of counts, and its greatest fraction of the work.
 const PILOT_RAYS: f64 = 5e5;
-const PILOT_SHARE: f64 = 0.04;
+const PILOT_SHARE: f64 = 0.08;
 
 /// Work of a ray of cached paths, with its share of lookups and light samples, and of a gather ray.
 const CACHED_RAY: f64 = 1.8;
