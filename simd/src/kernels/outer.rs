@@ -1,9 +1,9 @@
 //! Sums of outer products: for each row of a table, a few factors times every entry.
 //!
-//! sums[k][r] = Σ_i factors[i][r] table[i][k]. With N² strata as i and the functions of a basis as k this is
-//! a projection of radiance; with the borders between strata as i it is a sum over boundaries. Lanes run over
-//! k, sixteen at a time, so that each sum has the order of i on every level. The cost: tables are padded to
-//! sixteen entries, and factors are read once for each sixteen.
+//! `sums[k][r] = Σ_i factors[i][r] table[i][k]`. With N² strata as i and the functions of a basis as k this
+//! is a projection of radiance; with the borders between strata as i it is a sum over boundaries. Lanes run
+//! over k, sixteen at a time, so that each sum has the order of i on every level. The cost: tables are padded
+//! to sixteen entries, and factors are read once for each sixteen.
 
 use crate::lanes::{Lanes, Simd};
 use crate::level::{Kernel, Level};

@@ -1,7 +1,7 @@
 //! Derivatives of the coefficients of incident radiance with the position of the receiver.
 //!
-//! [`border_flux`] is the default. [`unoccluded`] and [`displaced`] are the analytic and the numeric gradient
-//! of Křivánek et al. (2005), for comparison: they do not see occlusion.
+//! [`border_flux()`] is the default. [`unoccluded()`] and [`displaced()`] are the analytic and the numeric
+//! gradient of Křivánek et al. (2005), for comparison: they do not see occlusion.
 
 mod border_flux;
 mod displaced;
