@@ -1,5 +1,5 @@
 //! A small picture by every method in one buffer, such as a `static` of a microcontroller: no heap, no
-//! threads, and no operating system but for the printing. `cargo verify targets` runs this very file without
+//! threads, and an operating system only to print. `cargo verify targets` runs this very file without
 //! libc, as WebAssembly and for Cortex-M: same bits everywhere.
 #[path = "room/mod.rs"]
 mod room;

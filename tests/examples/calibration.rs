@@ -143,7 +143,7 @@ fn calibrate(file: &Path, wanted: &Wanted) {
     );
 }
 
-/// What photons blur falls with the third root of the samples: a picture of fewer samples is blurred three
+/// The blur of photons falls with the third root of the samples: a picture of fewer samples is blurred three
 /// times as much, and half of the difference to it is taken off (docs/validation.md, the slope of progressive
 /// photon mapping). Its noise is nine times as large for that: 2.25 of its own, and a quarter of 27 times as
 /// much. Not where no blur is found, which is less than that.

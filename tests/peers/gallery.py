@@ -18,8 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ablation import ROOT, read_pfm
+from smallvcm import read_pfm
 
+ROOT = Path(__file__).resolve().parent.parent.parent
 PROGRAM = os.environ.get("HALFLIGHT", str(ROOT / "target" / "release" / "halflight"))
 GALLERY = ROOT / "docs" / "gallery"
 KEPT = ROOT / "tests" / "output" / "gallery"
@@ -94,7 +95,7 @@ def main():
                 picture, report = Path(folder) / "picture.pfm", Path(folder) / method
                 stop = ["--time", f"{arguments.seconds}s", "--audit", "off", "--caustics", "auto"]
                 render(scene, "--method", method, *stop, "--reference", reference, "--report", report, "-o", picture)
-                rows.append(read_pfm(picture)[::-1])
+                rows.append(read_pfm(picture))
                 with open(report / "curve.csv") as file:
                     points = [(float(row["seconds"]), float(row["reference_relmse"])) for row in csv.DictReader(file)]
                 curves[method] = [point for point in points if min(point) > 0]

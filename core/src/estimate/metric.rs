@@ -5,7 +5,7 @@
 use crate::Rgb;
 
 /// Fraction of the squared mean that keeps relMSE finite where the reference is dark.
-pub(super) const RELMSE_OFFSET: f64 = 0.01;
+pub(crate) const RELMSE_OFFSET: f64 = 0.01;
 
 /// Relative difference of pictures that sum the same light in different orders.
 pub(super) const ROUNDING: f64 = 1e-6;

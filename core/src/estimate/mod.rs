@@ -17,6 +17,7 @@ pub use deviation::Deviation;
 pub use empirical_bayes::{BrightnessClasses, Shrinkage};
 pub use filter::{filtered, filtered_pixel};
 pub use interval::ErrorEstimate;
+pub(crate) use metric::RELMSE_OFFSET;
 pub use metric::{Difference, mse, relmse, rmse};
 pub use student::{NORMAL_95, student_quantile};
 pub use tile::{TileError, TileLight};

@@ -12,6 +12,7 @@ use super::executor::{Executor, Passed};
 use super::{RenderContext, counts};
 use crate::Rgb;
 use crate::bsdf::Features;
+use crate::estimate::RELMSE_OFFSET;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 use crate::findings::Decision::Used;
 use crate::findings::{Finding, Value};
@@ -60,9 +61,6 @@ const FILLING: f64 = 0.44;
 /// Factor on the predicted error of light paths: their pilot underestimates light that paths seldom find.
 const LIGHT_PATHS_FACTOR: f64 = 2.0;
 
-/// Offset of relMSE, fraction of the squared mean of the picture.
-const DARK: f64 = 0.01;
-
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
 const LEAST_GAIN: f64 = 1.4;
 
@@ -78,7 +76,7 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// Whether a trial costs little beside a picture of so many `pixels`.
+    /// Whether a trial costs little beside a picture of `pixels` pixels.
     pub fn affords_trial(&self, pixels: usize) -> bool {
         let time = self.seconds.map(|seconds| seconds * RAYS_PER_SECOND);
         let samples = self.samples.map(|samples| f64::from(samples) * pixels as f64 * RAYS_PER_SAMPLE);
@@ -119,7 +117,7 @@ impl TileTrial {
             // A lamp is bright in both halves, a firefly in one.
             let least = brightness(all.even.mean()).min(brightness(all.odd.mean()));
             let own = level.max(least);
-            let scale = own * own + DARK * mean * mean;
+            let scale = own * own + RELMSE_OFFSET * mean * mean;
             if scale > 0.0 {
                 let variance = [all, rest].map(|pixel| brightness(pixel.variance()) / scale);
                 self.variance = [0, 1].map(|i| self.variance[i] + variance[i]);
@@ -148,7 +146,7 @@ pub struct Trial {
 
 /// Working memory of a worker.
 pub fn scratch<F: Features>() -> Footprint {
-    caustics::scratch::<F>().slice::<Pixel>(PIXELS_PER_TILE).slice::<Pixel>(PIXELS_PER_TILE)
+    caustics::scratch::<F>().slice::<Pixel>(2 * PIXELS_PER_TILE)
 }
 
 impl Trial {
@@ -252,11 +250,10 @@ impl Trial {
         for other in others {
             best = if other.1 < best.1 { other } else { best };
         }
-        let number = |value| Value::Number(value);
         let finding = Finding::new("method", Used, best.2)
-            .with("path", number(paths))
-            .with_some("irradiance_cache", cache.map(number))
-            .with_some("light_paths", of_light.map(number));
+            .with("path", Value::Number(paths))
+            .with_some("irradiance_cache", cache.map(Value::Number))
+            .with_some("light_paths", of_light.map(Value::Number));
         (best.0, finding)
     }
 }

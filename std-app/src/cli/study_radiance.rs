@@ -9,9 +9,9 @@ use std::process::ExitCode;
 
 /// Bases and derivatives of radiance coefficients in rooms of known light
 ///
-/// Bases: light that metal of several roughnesses reflects from incident light in so many coefficients.
-/// Gradients: derivatives of coefficients from gather rays against exact ones, in rooms with and without a
-/// surface that hides others.
+/// Bases: light that metal of several roughnesses reflects from incident light, by the number of its
+/// coefficients. Gradients: derivatives of coefficients from gather rays against exact ones, in rooms with
+/// and without a surface that hides others.
 #[derive(Args)]
 pub(super) struct Radiance {
     /// Parts of the study [default: all]

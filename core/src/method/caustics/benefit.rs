@@ -79,7 +79,7 @@ pub(super) fn visible(found: &[GuideSample]) -> f64 {
     found.iter().filter(|path| path.light > 0.0).count() as f64 / found.len().max(1) as f64
 }
 
-/// Mean radiance that the light paths `found` bring to a picture of so many `pixels`, in discs of `radius`
+/// Mean radiance that the light paths `found` bring to a picture of `pixels` pixels, in discs of `radius`
 /// pixels, and that path tracing with `samples` of each pixel finds less often than `least` times in all.
 /// Sorts `found`.
 pub(super) fn missing(
@@ -111,7 +111,7 @@ fn brightest_first(found: &mut [GuideSample]) -> impl Iterator<Item = &GuideSamp
 }
 
 impl Benefit {
-    /// By the light paths `found`, in discs of `radius` pixels, for a picture of so many `pixels` in which
+    /// By the light paths `found`, in discs of `radius` pixels, for a picture of `pixels` pixels in which
     /// all other light has a `mean` radiance. Sorts `found`.
     pub(super) fn new(found: &mut [GuideSample], radius: f64, pixels: f64, mean: f64) -> Self {
         // Power over the area of a disc, on a diffuse surface of albedo 0.5.

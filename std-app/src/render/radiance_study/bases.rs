@@ -1,12 +1,12 @@
 //! Errors of the light that metal reflects, for bases of incident radiance and numbers of coefficients.
 
+use super::Random;
 use super::rooms::Room;
-use super::{Random, arena};
 use glam::Vec3;
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, Conductor};
 use halflight_core::cache::radiance::{sh, zernike};
-use halflight_core::memory::{Line, OutOfMemory};
+use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::sampling::warp::cosine_hemisphere;
 
 /// GGX alphas of the lobes.
@@ -103,7 +103,7 @@ pub(super) fn errors() -> Result<Vec<BasisError>, OutOfMemory> {
         }
     }
     let mut lines = vec![Line([0; 64]); sh::ShTables::footprint(STRATA, sh::ORDER_MAX).bytes() / 64];
-    let tables = sh::ShTables::build(STRATA, sh::ORDER_MAX, &mut arena(&mut lines))?;
+    let tables = sh::ShTables::build(STRATA, sh::ORDER_MAX, &mut Arena::over(&mut lines))?;
     let per_stratum = tables.integrals().len() / (STRATA * STRATA);
 
     let zernike = [2, 4, 6, 8].map(|d| ("zernike", d, zernike::count(d)));

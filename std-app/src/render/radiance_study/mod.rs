@@ -10,7 +10,6 @@ pub use bases::{ALPHAS, BasisError};
 pub use gradients::GradientError;
 
 use super::RenderError;
-use halflight_core::memory::{Arena, Line};
 
 /// Errors of bases of incident radiance, by the number of coefficients.
 pub fn study_bases() -> Result<Vec<BasisError>, RenderError> {
@@ -25,11 +24,6 @@ pub fn study_gradients(strata: &[usize], tell: &mut dyn FnMut(&GradientError)) -
         }
     }
     Ok(())
-}
-
-/// Arena over whole lines.
-fn arena(lines: &mut [Line]) -> Arena<'_> {
-    Arena::new(bytemuck::cast_slice_mut(lines))
 }
 
 /// xorshift64*.
