@@ -34,9 +34,9 @@ HARD = Path(__file__).resolve().parent / "scenes" / "hard"
 SCENES = {
     "cornell-box-bitterli": "path", "cbox-mitsuba": "path", "living-room": "path", "staircase": "path",
     "sponza-dabrovic": "path", "veach-ajar": "path", "veach-door": "bdpt",
-    "veach-bidir": "bdpt", "lux-causticcube": "vcm", "torus": "sppm", "caustic-glass": "vcm",
-    "water-caustic": "sppm", "two-rooms": "path", "glossy": "path", "caustic": "vcm", "up-light": "bdpt",
-    "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "vcm",
+    "veach-bidir": "bdpt", "lux-causticcube": "path", "torus": "sppm", "caustic-glass": "vcm",
+    "water-caustic": "sppm", "two-rooms": "bdpt", "glossy": "path", "caustic": "path", "up-light": "path",
+    "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "path",
 }
 
 

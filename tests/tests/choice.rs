@@ -6,8 +6,9 @@
 use crate::table::scenes::SCENES;
 use core::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
-use halflight::render::{self, Checkpoint, Method, Progress, RenderResult, Settings, Stop};
+use halflight::render::{self, Checkpoint, Ending, Method, Progress, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
+use halflight_core::findings::Value;
 use halflight_core::scene::{Camera, Material};
 use halflight_simd::Level;
 use halflight_tests::render::{number, render};
@@ -100,6 +101,36 @@ fn a_resumed_film_goes_on_with_the_method_that_was_chosen() {
     std::fs::remove_file(path).expect("a film");
     assert_eq!([begun.method, resumed.method], [whole.method; 2]);
     assert!(resumed.image.pixels == whole.image.pixels);
+}
+
+#[test]
+fn path_tracing_takes_the_place_of_a_chosen_method_whose_bias_exceeds_the_requested_error() {
+    let room = room_with_up_light();
+    let path = std::env::temp_dir().join(format!("halflight-fallback-{}", std::process::id()));
+    let to_error = |settings: &mut Settings| {
+        settings.stop = Stop { error: Some(2e-3), ..Stop::default() };
+        // The prediction assumes records of the usual density.
+        settings.cache.error = Some(1.0);
+    };
+    let result = chosen(&room, |settings| {
+        to_error(settings);
+        settings.checkpoint = Some(Checkpoint { path: path.clone(), every: f64::INFINITY });
+    });
+    assert_eq!((result.method, result.ending), (Method::Path, Ending::Done));
+    let given_up = result.findings.get("method").expect("a choice").values().last();
+    assert_eq!(given_up, Some(("given_up", Value::Name("irradiance-cache"))));
+    // The film is that of path tracing alone.
+    let paths = chosen(&room, |settings| {
+        to_error(settings);
+        settings.method = Some(Method::Path);
+    });
+    assert!(result.image.pixels == paths.image.pixels && result.spp == paths.spp);
+    let resumed = chosen(&room, |settings| {
+        to_error(settings);
+        settings.resume = Some(path.clone());
+    });
+    std::fs::remove_file(path).expect("a film");
+    assert!(resumed.method == Method::Path && resumed.image.pixels == paths.image.pixels);
 }
 
 /// Samples per pixel of the pictures of the snapshot.

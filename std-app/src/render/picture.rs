@@ -39,7 +39,7 @@ pub(super) struct Picture<'a> {
     pub(super) audit: Option<Audit<'a>>,
     pub(super) identity: Identity,
     pub(super) resumed: Option<Reader>,
-    pub(super) clock: Clock,
+    pub(super) clock: &'a mut Clock,
     pub(super) progress: &'a mut dyn FnMut(&Progress),
     pub(super) interrupt: &'a AtomicBool,
     /// Path tracing of single pixels for a picture without samples.

@@ -9,8 +9,8 @@ use super::method::{self, Attempt, Method, Plan, RenderSetup};
 use super::picture::Picture;
 use super::workers::Workers;
 use super::{
-    MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file, environment_visibility,
-    gaps,
+    Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file,
+    environment_visibility, gaps,
 };
 use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
@@ -49,11 +49,7 @@ pub fn render(
         return Err(RenderError::Shard);
     }
     let plan = Census::of(scene).plan();
-    let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
     let method = settings.method.or(Method::named(plan.method)).unwrap_or(Method::Path);
-    if keeps_cache && method != Method::IrradianceCache {
-        return Err(RenderError::NoCache);
-    }
     plan.features.dispatch(Render { scene, settings, method, progress, interrupt })
 }
 
@@ -77,10 +73,14 @@ impl WithFeatures for Render<'_> {
         let mut memory = Memory::new(scene, settings, &bank);
         let most = memory.for_file();
         let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
-        let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
+        let mut resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
         // A film file holds the method that prepasses chose.
         let of_film = resumed.as_ref().and_then(|film| film.header.method());
         let method = settings.method.or(of_film).unwrap_or(method);
+        let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
+        if keeps_cache && method != Method::IrradianceCache {
+            return Err(RenderError::NoCache);
+        }
         let identity =
             |method: Method| Identity::of(scene, method, &path_settings(settings), settings, cache.clone());
         if let Some(film) = &resumed {
@@ -103,11 +103,9 @@ impl WithFeatures for Render<'_> {
         let lights = lights.with_level(settings.level);
         let build = build_start.elapsed().as_secs_f64();
 
-        let clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
+        let mut clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
         let left = settings.stop.seconds.map(|limit| limit - clock.seconds());
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
-        let mut film_arena = Arena::over(&mut film_lines);
-        let state = RenderState::new(width, height, settings.shard, &mut film_arena)?;
         let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
         let setup = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
@@ -146,16 +144,23 @@ impl WithFeatures for Render<'_> {
             let picture = Picture {
                 method,
                 setup,
-                state,
+                state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
                 audit,
                 identity: identity(method),
-                resumed,
-                clock,
+                resumed: resumed.take(),
+                clock: &mut clock,
                 sketch: &sketch,
-                progress,
+                progress: &mut *progress,
                 interrupt,
             };
             let done = picture.render(&mut *renderer)?;
+            if may_fall_back && falls_back(&done, settings, clock.seconds()) {
+                drop(renderer);
+                memory.release(&own);
+                may_fall_back = false;
+                plan = Plan::instead_of(&done);
+                continue;
+            }
             let seconds = Seconds { build, ..done.seconds };
             let findings = Findings::default().and(visibility).and(done.findings);
             return Ok(RenderResult {
@@ -167,6 +172,14 @@ impl WithFeatures for Render<'_> {
             });
         }
     }
+}
+
+/// Whether path tracing is to replace the method that prepasses chose for the picture `done`: the requested
+/// error is out of the method's reach, and at least half of the time is left.
+fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
+    let is_lost = matches!(done.ending, Ending::Biased | Ending::NoiseFloor);
+    let has_time = settings.stop.seconds.is_none_or(|limit| seconds <= 0.5 * limit);
+    is_lost && has_time && settings.shard == Shard::WHOLE
 }
 
 /// Path settings common to all methods.

@@ -45,7 +45,10 @@ pub(super) fn choose<'a, F: Features>(
     let instead = match (best, light_paths) {
         (Best::Paths, _) | (Best::LightPaths, None) => None,
         (Best::Cache, _) => Some(Method::IrradianceCache.into()),
-        (Best::LightPaths, Some(choice)) => Some(Plan::with_counts(Method::VertexMerging, choice)),
+        (Best::LightPaths, Some(choice)) => {
+            let method = if choice.counts.merging { Method::VertexMerging } else { Method::Bidirectional };
+            Some(Plan::with_counts(method, choice))
+        }
     };
     Ok(Some(Chosen { instead, finding }))
 }

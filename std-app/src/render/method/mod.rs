@@ -27,12 +27,12 @@ use super::run::path_settings;
 use super::survey::Survey;
 use super::threads::{ThreadedRound, Threads};
 use super::workers::Workers;
-use super::{RenderError, Settings};
+use super::{RenderError, RenderResult, Settings};
 use crate::save::Patience;
 use core::marker::PhantomData;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
-use halflight_core::findings::Findings;
+use halflight_core::findings::{Findings, Value};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Footprint, Line, OutOfMemory};
 use halflight_core::method::caustics::CausticPathTracing;
@@ -72,6 +72,15 @@ impl<F> Plan<'_, F> {
     /// Path tracing, unless prepasses predict less error by another method.
     pub(super) fn open() -> Self {
         Self { is_open: true, ..Method::Path.into() }
+    }
+
+    /// Path tracing in place of the chosen method of `picture`, which cannot reach the requested error.
+    pub(super) fn instead_of(picture: &RenderResult) -> Self {
+        let mut finding = picture.findings.get("method").copied().unwrap_or_default();
+        finding.topic = "method";
+        finding.reason = "the chosen method cannot reach the requested error: path tracing takes its place";
+        let findings = finding.with("given_up", Value::Name(picture.method.name())).into();
+        Self { findings, ..Method::Path.into() }
     }
 
     /// A bidirectional method with the counts of `choice`.
