@@ -1,8 +1,8 @@
 """Every method on every scene after the same time, and `auto` against the best of them.
 
-    HALFLIGHT=program python3 tests/peers/methods.py [--budgets 1.5 7.5] [--scenes NAME,...] [--methods NAME,...]
+    HALFLIGHT=program python3 tests/peers/methods.py [--budgets 1.5 7.5] [--scenes NAME,...] [--methods NAME,...] [--rooms SEED ...]
 
-Each method renders 128 x 128 pixels for the seconds of a budget on one thread, one seed after the other. The table
+`--rooms` measures rooms by random numbers (random_rooms.py) in place of the scenes. Each method renders 128 x 128 pixels for the seconds of a budget on one thread, one seed after the other. The table
 has relMSE; the regret of `auto` is its error over that of the best other method. References are pictures of
 another seed by a method that suits the scene, kept in the output folder; the noise that they estimate of
 themselves is subtracted. Runs are kept, too: a second call renders those that are missing. Needs numpy, and
@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+import random_rooms
 from ablation import OWN, ROOT, read_pfm, relmse
 from published import published
 from scene_file import write_scene
@@ -34,7 +35,7 @@ HARD = Path(__file__).resolve().parent / "scenes" / "hard"
 SCENES = {
     "cornell-box-bitterli": "path", "cbox-mitsuba": "path", "living-room": "path", "staircase": "path",
     "sponza-dabrovic": "path", "veach-ajar": "path", "veach-door": "bdpt",
-    "veach-bidir": "bdpt", "lux-causticcube": "path", "torus": "sppm", "caustic-glass": "vcm",
+    "veach-bidir": "bdpt", "lux-causticcube": "vcm", "torus": "sppm", "caustic-glass": "vcm",
     "water-caustic": "sppm", "two-rooms": "bdpt", "glossy": "path", "caustic": "path", "up-light": "path",
     "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "path",
 }
@@ -47,9 +48,18 @@ def scene_file(name, folder):
     if (HARD / f"{name}.toml").exists():
         return HARD / f"{name}.toml"
     path = Path(folder) / f"{name}.toml"
+    if name.startswith("room-"):
+        return random_rooms.room(folder, int(name[5:]))
     if not path.exists():
         write_scene(path, published(name, SIZE))
     return path
+
+
+def reference_method(name):
+    """Method of the reference of scene `name`."""
+    if not name.startswith("room-"):
+        return SCENES[name]
+    return {"door": "bdpt", "spot": "bdpt", "glass ball": "vcm", "sun": "bdpt"}.get(random_rooms.light(int(name[5:])), "path")
 
 
 def render(scene, flags, threads=1):
@@ -67,7 +77,7 @@ def reference(name, scene, seconds):
     """A converged picture and the relMSE that is left in it, by its own estimate."""
     kept = OUTPUT / f"{name}.npz"
     if not kept.exists():
-        flags = ["--time", f"{seconds}s", "--seed", "1000", "--method", SCENES[name]]
+        flags = ["--time", f"{seconds}s", "--seed", "1000", "--method", reference_method(name)]
         picture, facts = render(scene, flags)
         np.savez(kept, picture=picture, relmse=facts["error"]["relmse"])
         print(f"# {name}: {facts['method']}, {facts['spp']} spp, relMSE {facts['error']['relmse']:.2e}", flush=True)
@@ -89,6 +99,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--budgets", type=float, nargs="+", default=[1.5, 7.5])
     parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--rooms", type=int, nargs="+", help="seeds of random rooms")
     parser.add_argument("--methods", default=",".join(METHODS))
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--reference-seconds", type=int, default=60)
@@ -100,7 +111,7 @@ def main():
     rows = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     known = {(row["scene"], row["method"], row["budget"], row["seed"]) for row in rows}
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(a.jobs) as pool, open(log, "a") as out:
-        names = a.scenes.split(",")
+        names = [f"room-{seed}" for seed in a.rooms] if a.rooms else a.scenes.split(",")
         files = {name: scene_file(name, folder) for name in names}
         converged = dict(zip(names, pool.map(lambda name: reference(name, files[name], a.reference_seconds), names)))
         jobs = [
@@ -113,7 +124,7 @@ def main():
             out.write(json.dumps(row) + "\n")
             out.flush()
     for budget in a.budgets:
-        table([row for row in rows if row["budget"] == budget], budget)
+        table([row for row in rows if row["budget"] == budget and row["scene"] in names], budget)
 
 
 def table(rows, budget):

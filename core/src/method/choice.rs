@@ -7,9 +7,10 @@
 //! and not in seconds: the choice follows from scene, settings, seed, memory and, where time is limited, the
 //! number of threads.
 
+use super::RenderContext;
 use super::caustics::{self, CausticPathTracing};
+use super::counts::{self, LightPaths};
 use super::executor::{Executor, Passed};
-use super::{RenderContext, counts};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::estimate::RELMSE_OFFSET;
@@ -58,8 +59,15 @@ const BIAS: f64 = 3e-4;
 /// Greatest fraction of the work for filling; radii grow if filling needs more.
 const FILLING: f64 = 0.44;
 
-/// Factor on the predicted error of light paths: their pilot underestimates light that paths seldom find.
-const LIGHT_PATHS_FACTOR: f64 = 2.0;
+/// Factor on the predicted error of light paths: their rays take more time.
+const LIGHT_PATHS_FACTOR: f64 = 1.5;
+
+/// Factor on the predicted errors of path tracing and of a cache with caustic photons: light paths, density
+/// estimates, and noise that sixteen samples of a block do not show.
+const PHOTONS_FACTOR: f64 = 6.0;
+
+/// Greatest relMSE of path tracing: all light is missing.
+const ALL_IS_MISSING: f64 = 1.0;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
 const LEAST_GAIN: f64 = 1.4;
@@ -142,6 +150,16 @@ pub struct Trial {
     pub record_rays: f64,
     /// Parts in which the picture is rendered, each with caches of its own.
     pub shards: f64,
+    /// Whether caustic photons belong to the picture.
+    pub has_photons: bool,
+}
+
+/// Predicted relMSE of each method; infinite for one that is no choice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Predictions {
+    paths: f64,
+    cache: f64,
+    light_paths: f64,
 }
 
 /// Working memory of a worker.
@@ -165,6 +183,7 @@ impl Trial {
         let settings = PathSettings { seed: !context.settings.seed, ..context.settings };
         let all = RenderContext { settings, ..*context }.integrator::<F>();
         let rest = all.without_cached_light();
+        let has_photons = paths.finding().used;
         let (reuse, mean) = (paths.reuse(), f64::from(paths.mean_radiance(executor)?));
         let tiles = match paths.photons() {
             None => trace((&all, &rest), mean, executor)?,
@@ -181,7 +200,7 @@ impl Trial {
             None => 1.0,
         };
         let (pixels, record_rays, shards) = (context.pixels() as f64, record_rays.into(), shards.into());
-        Ok(Some(Self { reuse, pixels, record_rays, shards, ..Self::of(&tiles) }))
+        Ok(Some(Self { reuse, pixels, record_rays, shards, has_photons, ..Self::of(&tiles) }))
     }
 
     /// Noise and work of `tiles`.
@@ -209,14 +228,30 @@ impl Trial {
         self.reuse * self.noise[0] * self.work[0] / work
     }
 
-    /// relMSE with an irradiance cache after so much work for each pixel.
-    pub fn error_of_cache(&self, work: f64) -> f64 {
+    /// relMSE with an irradiance cache after so much work for each pixel. `rare` is the noise of paths by
+    /// rare light, as a factor on that of the trial.
+    pub fn error_of_cache(&self, work: f64, rare: f64) -> f64 {
         let of_record = self.shards * self.record_rays / USUAL_RAYS;
         let filling = of_record * GATHER_RAY * GATHER_RAYS * libm::pow(self.pixels, -GATHER_POWER);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
         let gathered = (self.noise[0] - self.noise[1]).max(0.0) / (self.record_rays * RECORDS);
-        self.noise[1] * CACHED_RAY * self.work[1] / left + wider * (gathered + BIAS)
+        rare * self.noise[1] * CACHED_RAY * self.work[1] / left + wider * (rare * gathered + BIAS)
+    }
+
+    /// Errors after so much work for each pixel.
+    fn predict(&self, work: f64, may_have_cache: bool, light_paths: Option<LightPaths>) -> Predictions {
+        let of_trial = self.error_of_paths(work);
+        // The pilot of light paths finds light that the few paths of the trial miss.
+        let of_pilot =
+            light_paths.and_then(|pilot| pilot.of_paths).map(|product| self.reuse * product / work);
+        let factor = if self.has_photons { PHOTONS_FACTOR } else { 1.0 };
+        let paths = (factor * of_trial).max(of_pilot.unwrap_or(0.0).min(ALL_IS_MISSING));
+        Predictions {
+            paths,
+            cache: if may_have_cache { self.error_of_cache(work, paths / of_trial) } else { f64::INFINITY },
+            light_paths: light_paths.map_or(f64::INFINITY, |pilot| LIGHT_PATHS_FACTOR * pilot.product / work),
+        }
     }
 
     /// Whether the pilot of light paths costs little beside the picture.
@@ -224,37 +259,34 @@ impl Trial {
         self.budget(goal) * self.pixels > PILOT_RAYS / PILOT_SHARE
     }
 
-    /// The method with the least error for `goal`, and the reason; light paths if their pilot ran and found a
-    /// ratio of noise × work of path tracing to theirs.
-    pub fn best(&self, goal: &Goal, may_have_cache: bool, light_paths: Option<f64>) -> (Best, Finding) {
+    /// The method with the least error for `goal`, and the reason; light paths if their pilot prefers them to
+    /// path tracing.
+    pub fn best(
+        &self,
+        goal: &Goal,
+        may_have_cache: bool,
+        light_paths: Option<LightPaths>,
+    ) -> (Best, Finding) {
         if self.noise[0] <= 0.0 {
             return (Best::Paths, Finding::new("method", Used, "paths show no noise"));
         }
-        let work = self.budget(goal);
-        let paths = self.error_of_paths(work);
-        let cache = may_have_cache.then(|| self.error_of_cache(work));
-        let of_light = light_paths.map(|gain| LIGHT_PATHS_FACTOR * paths / gain.max(1e-3));
-        let mut best = (Best::Paths, paths / LEAST_GAIN, "path tracing has the least error");
-        let others = [
-            (
-                Best::Cache,
-                cache.unwrap_or(f64::INFINITY),
-                "an irradiance cache has less error than path tracing",
-            ),
-            (
-                Best::LightPaths,
-                of_light.unwrap_or(f64::INFINITY),
-                "light paths have less error than paths alone",
-            ),
-        ];
-        for other in others {
-            best = if other.1 < best.1 { other } else { best };
-        }
-        let finding = Finding::new("method", Used, best.2)
+        let Predictions { paths, cache, light_paths } =
+            self.predict(self.budget(goal), may_have_cache, light_paths);
+        let (best, reason) = match () {
+            () if paths <= LEAST_GAIN * cache.min(light_paths) => {
+                (Best::Paths, "path tracing has the least error")
+            }
+            () if cache <= light_paths => {
+                (Best::Cache, "an irradiance cache has less error than path tracing")
+            }
+            () => (Best::LightPaths, "light paths have less error than paths alone"),
+        };
+        let number = |error: f64| error.is_finite().then_some(Value::Number(error));
+        let finding = Finding::new("method", Used, reason)
             .with("path", Value::Number(paths))
-            .with_some("irradiance_cache", cache.map(Value::Number))
-            .with_some("light_paths", of_light.map(Value::Number));
-        (best.0, finding)
+            .with_some("irradiance_cache", number(cache))
+            .with_some("light_paths", number(light_paths));
+        (best, finding)
     }
 }
 

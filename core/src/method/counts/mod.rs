@@ -113,6 +113,26 @@ fn structural(context: &RenderContext) -> Option<&'static str> {
     }
 }
 
+/// Noise × work by the pilot: relative variance of a sample of a pixel, times its rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPaths {
+    /// With the counts of the choice.
+    pub product: f64,
+    /// Of path tracing; `None` where caustic photons supply light that its paths seldom find.
+    pub of_paths: Option<f64>,
+}
+
+/// Finding on `topic`, if the part is used.
+fn used<'f>(findings: &'f Findings, topic: &str) -> Option<&'f Finding> {
+    findings.get(topic).filter(|finding| finding.decision != Decision::LeftOut)
+}
+
+/// Whether the photons of path tracing are its means against rare light.
+fn has_caustic_photons(findings: &Findings) -> bool {
+    let share = used(findings, "caustic_photons").and_then(|finding| finding.number("share_of_light"));
+    share.is_some_and(|share| share > CAUSTIC_LIGHT)
+}
+
 impl Choice {
     /// Light paths, connections and merges.
     pub fn findings(&self) -> Findings {
@@ -191,17 +211,23 @@ impl Choice {
         }
     }
 
+    /// Noise × work of the pilot beside path tracing with these `findings`; `None` without light paths.
+    pub fn products(&self, findings: &Findings) -> Option<LightPaths> {
+        let product = f64::from(self.noise) * f64::from(self.work);
+        let gain = self.gain.filter(|_| self.counts.light_paths > 0.0)?;
+        let of_paths = (!has_caustic_photons(findings)).then_some(f64::from(gain) * product);
+        Some(LightPaths { product, of_paths })
+    }
+
     /// The choice beside path tracing with its own means, path reuse and caustic photons, by its `findings`.
     pub fn beside(mut self, findings: &Findings) -> Self {
         let Some(gain) = self.gain.filter(|_| self.counts.light_paths > 0.0) else { return self };
-        let used = |topic| findings.get(topic).filter(|finding| finding.decision != Decision::LeftOut);
-        let number = |topic, name| used(topic).and_then(|finding| finding.number(name));
-        if let (Some(gained), Some(cost)) = (number("path_reuse", "gain"), number("path_reuse", "cost")) {
+        let number = |name| used(findings, "path_reuse").and_then(|finding| finding.number(name));
+        if let (Some(gained), Some(cost)) = (number("gain"), number("cost")) {
             self.gain = Some(gain * (cost / gained.min(REUSE_GAIN)) as f32);
         }
         // Photons find what splats and merges find of caustics.
-        let share = number("caustic_photons", "share_of_light");
-        let has_photons = share.is_some_and(|share| share > CAUSTIC_LIGHT);
+        let has_photons = has_caustic_photons(findings);
         if has_photons {
             self.gain = self.gain.map(|gain| gain.min(self.gain_of_connections));
         }

@@ -38,10 +38,12 @@ pub(super) fn choose<'a, F: Features>(
         false => None,
     };
     // Merges are biased, as caches are.
-    let light_paths = light_paths.map(|choice| choice.beside(&paths.findings()));
     let light_paths = light_paths.filter(|choice| is_audited || !choice.counts.merging);
-    let gain = light_paths.filter(|choice| choice.counts.light_paths > 0.0).and_then(|choice| choice.gain);
-    let (best, finding) = trial.best(&goal, is_audited && may_have_cache(setup), gain.map(f64::from));
+    let findings = paths.findings();
+    let products = light_paths.and_then(|choice| choice.products(&findings));
+    let light_paths = light_paths.map(|choice| choice.beside(&findings));
+    let products = products.filter(|_| light_paths.is_some_and(|choice| choice.counts.light_paths > 0.0));
+    let (best, finding) = trial.best(&goal, is_audited && may_have_cache(setup), products);
     let instead = match (best, light_paths) {
         (Best::Paths, _) | (Best::LightPaths, None) => None,
         (Best::Cache, _) => Some(Method::IrradianceCache.into()),
