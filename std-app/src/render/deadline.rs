@@ -79,6 +79,45 @@ impl<'w> Deadline<'w> {
     }
 }
 
+/// End of a pass.
+#[derive(Clone, Copy)]
+pub(super) enum End {
+    /// Prepasses: some seconds after the end of the render.
+    Prepass,
+    /// First round: some seconds later still, so that every pixel has a sample.
+    FirstRound(Option<Instant>),
+    /// Samples of tiles in it, from their start on: they have some time of their own. Where they are cut,
+    /// every tile has its chance, and gaps are filled (`gaps.rs`).
+    FirstSamples(Option<Instant>, Instant),
+    /// Every other round: at its deadline and when the user interrupts.
+    Round(Option<Instant>),
+    /// A sketch after the end of the render: at a time.
+    Sketch(Instant),
+}
+
+impl End {
+    pub(super) fn is_over(self, render: &Deadline) -> bool {
+        let is_past = |deadline: Option<Instant>| deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        match self {
+            End::Prepass => render.is_over(),
+            End::FirstRound(deadline) => render.is_late() || is_past(deadline),
+            End::FirstSamples(deadline, start) => {
+                render.is_late() || is_past(deadline) || render.ends_samples_since(start)
+            }
+            End::Round(deadline) => render.is_interrupted() || is_past(deadline),
+            End::Sketch(end) => is_past(Some(end)),
+        }
+    }
+
+    pub(super) fn deadline(self) -> Option<Instant> {
+        match self {
+            End::Prepass => None,
+            End::FirstRound(deadline) | End::FirstSamples(deadline, _) | End::Round(deadline) => deadline,
+            End::Sketch(end) => Some(end),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,7 +2,7 @@
 
 use super::audit::{Audit, Audited};
 use super::regions;
-use super::workers::Workers;
+use super::threads::Workers;
 use halflight_core::estimate::{
     BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
 };

@@ -1,8 +1,8 @@
 //! Filling of pixels without samples in a picture that ended early: each gets the mean of its surroundings.
 //! If there is no sample at all, some pixels are path traced first for a short time.
 
-use super::threads::{End, Threads};
-use super::workers::Workers;
+use super::deadline::End;
+use super::threads::{Threads, Workers};
 use crate::save::Image;
 use core::time::Duration;
 use halflight_core::bsdf::Features;

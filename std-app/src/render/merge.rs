@@ -8,7 +8,7 @@ use super::film_file::Reader;
 use super::method::Method;
 use super::picture::image;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
-use super::workers::Workers;
+use super::threads::Workers;
 use crate::memory::{Budget, lines};
 use crate::save::Image;
 use halflight_core::memory::Arena;

@@ -31,7 +31,6 @@ mod sealed;
 mod study;
 mod survey;
 mod threads;
-mod workers;
 
 pub use audit::{Audited, Region};
 pub use cache_file::inspect as inspect_cache;

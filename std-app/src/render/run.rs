@@ -7,7 +7,7 @@ use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{self, Attempt, Method, Plan, RenderSetup};
 use super::picture::Picture;
-use super::workers::Workers;
+use super::threads::Workers;
 use super::{
     Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file,
     environment_visibility, gaps,

@@ -1,12 +1,12 @@
 //! Studies of irradiance caching: errors of each metric at the same number of records, at held-out points of
 //! the picture.
 
+use super::deadline::End;
 use super::held_out::{EXACT, Point, held_out, luminance};
 use super::memory::{Bank, Memory};
 use super::run::{build_bvh, path_settings};
 use super::survey::means;
-use super::threads::{End, Threads};
-use super::workers::Workers;
+use super::threads::{Threads, Workers};
 use super::{RenderError, Settings};
 use crate::pages::Pages;
 use halflight_core::bsdf::{All, Features};

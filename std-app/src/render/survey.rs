@@ -2,8 +2,9 @@
 //! error at held-out points.
 
 use super::RenderError;
+use super::deadline::End;
 use super::held_out::{Point, held_out, luminance, stride};
-use super::threads::{End, Threads};
+use super::threads::Threads;
 use core::time::Duration;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};

@@ -1,50 +1,95 @@
-//! Executor of the program: a thread pool that ends at deadlines and interrupts.
+//! Threads of the program: a pool whose threads take the next task when they are free, each with its own
+//! working memory, and the executor on it, which ends passes at deadlines and interrupts.
 
-use super::deadline::Deadline;
-use super::workers::{Fork, Workers};
-use halflight_core::bvh::ForkJoin;
-use halflight_core::memory::{Line, OutOfMemory};
+use super::RenderError;
+use super::deadline::{Deadline, End};
+use halflight_core::Level;
+use halflight_core::bvh::{Bvh, ForkJoin};
+use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::method::{Executor, Passed, RenderState, Round, Worker};
+use halflight_core::scene::Mesh;
 use halflight_core::transport::Counters;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// End of a pass.
-#[derive(Clone, Copy)]
-pub(super) enum End {
-    /// Prepasses: some seconds after the end of the render.
-    Prepass,
-    /// First round: some seconds later still, so that every pixel has a sample.
-    FirstRound(Option<Instant>),
-    /// Samples of tiles in it, from their start on: they have some time of their own. Where they are cut,
-    /// every tile has its chance, and gaps are filled (`gaps.rs`).
-    FirstSamples(Option<Instant>, Instant),
-    /// Every other round: at its deadline and when the user interrupts.
-    Round(Option<Instant>),
-    /// A sketch after the end of the render: at a time.
-    Sketch(Instant),
+/// A pool of threads.
+pub(super) struct Workers<'w> {
+    /// End of its passes.
+    pub(super) deadline: Deadline<'w>,
+    /// Pool, and fork-join on it.
+    pub(super) fork: Fork,
+    /// Seconds of each phase of the render.
+    phases: Mutex<Vec<(&'static str, f64)>>,
 }
 
-impl End {
-    fn is_over(self, render: &Deadline) -> bool {
-        let is_past = |deadline: Option<Instant>| deadline.is_some_and(|deadline| Instant::now() >= deadline);
-        match self {
-            End::Prepass => render.is_over(),
-            End::FirstRound(deadline) => render.is_late() || is_past(deadline),
-            End::FirstSamples(deadline, start) => {
-                render.is_late() || is_past(deadline) || render.ends_samples_since(start)
-            }
-            End::Round(deadline) => render.is_interrupted() || is_past(deadline),
-            End::Sketch(end) => is_past(Some(end)),
+impl<'w> Workers<'w> {
+    /// A pool of `threads` threads; `None`: all of the machine.
+    pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+        let phases = Mutex::default();
+        pool.map(|pool| Self { fork: Fork(pool), deadline: Deadline::default(), phases })
+            .map_err(|error| RenderError::Threads(error.to_string()))
+    }
+
+    /// A pool whose passes end at `deadline`.
+    pub(super) fn ending_at(self, deadline: Deadline<'w>) -> Self {
+        Self { deadline, ..self }
+    }
+
+    /// Adds `seconds` to a phase.
+    pub(super) fn spent(&self, phase: &'static str, seconds: f64) {
+        let mut phases = self.phases.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        match phases.iter_mut().find(|(other, _)| *other == phase) {
+            Some((_, sum)) => *sum += seconds,
+            None => phases.push((phase, seconds)),
         }
     }
 
-    fn deadline(self) -> Option<Instant> {
-        match self {
-            End::Prepass => None,
-            End::FirstRound(deadline) | End::FirstSamples(deadline, _) | End::Round(deadline) => deadline,
-            End::Sketch(end) => Some(end),
-        }
+    /// Seconds of a phase so far.
+    pub(super) fn seconds_of(&self, phase: &str) -> f64 {
+        let phases = self.phases.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        phases.iter().find(|(other, _)| *other == phase).map_or(0.0, |(_, seconds)| *seconds)
+    }
+
+    /// Number of threads.
+    pub(super) fn count(&self) -> usize {
+        self.fork.0.current_num_threads()
+    }
+
+    /// Runs `work` on the pool, whose threads take the parts of its parallel iterators.
+    pub(super) fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.fork.0.install(work)
+    }
+
+    /// Builds the BVH of `mesh` on all threads.
+    pub(super) fn build_bvh<'m>(
+        &self,
+        mesh: &Mesh,
+        level: Level,
+        arena: &mut Arena<'m>,
+    ) -> Result<Bvh<'m>, OutOfMemory> {
+        self.install(|| Bvh::build_with(mesh, arena, level, &self.fork))
+    }
+
+    /// Runs `work` once on every thread, each with its own working memory.
+    pub(super) fn on_all<T: Send>(
+        &self,
+        scratch: &mut [Vec<Line>],
+        work: impl Fn(&mut Arena) -> Result<T, OutOfMemory> + Sync,
+    ) -> Result<Vec<T>, OutOfMemory> {
+        let one = |lines: &mut Vec<Line>| work(&mut Arena::over(lines));
+        self.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
+    }
+}
+
+/// Forks on the threads of a pool.
+pub(super) struct Fork(ThreadPool);
+
+impl ForkJoin for Fork {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        self.0.join(a, b);
     }
 }
 
@@ -219,9 +264,9 @@ mod tests {
     use core::sync::atomic::{AtomicBool, Ordering};
     use glam::Vec3;
     use halflight_core::Rgb;
-    use halflight_core::memory::Arena;
     use halflight_core::method::PhotonMapStore;
     use halflight_core::photon::Photon;
+    use halflight_core::scene::Triangle;
 
     #[test]
     fn scattering_keeps_every_item() {
@@ -284,6 +329,32 @@ mod tests {
             let is_complete = interrupted_by.is_none();
             assert_eq!(passed.unwrap().is_complete, is_complete);
             assert_eq!(store.map().unwrap().is_some(), is_complete);
+        }
+    }
+
+    /// Bytes of the BVH of a wavy sheet of 2 * `side`² triangles.
+    fn built(side: u32, threads: usize) -> Vec<u8> {
+        let places = (0..=side).flat_map(|y| (0..=side).map(move |x| (x as f32, y as f32)));
+        let positions: Vec<[f32; 3]> = places.map(|(x, y)| [x, y, (0.1 * x).sin() * y.sqrt()]).collect();
+        let corners = (0..side * side).map(|cell| cell / side * (side + 1) + cell % side);
+        let halves = corners.flat_map(|a| [[a, a + 1, a + side + 2], [a, a + side + 2, a + side + 1]]);
+        let triangles: Vec<Triangle> = halves.map(|vertices| Triangle { vertices, material: 0 }).collect();
+        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+
+        let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
+        let mut arena = Arena::over(&mut lines);
+        let bvh = Workers::new(Some(threads)).unwrap().build_bvh(&mesh, Level::detect(), &mut arena).unwrap();
+        let mut kept = vec![Line([0; 64]); bvh.used().bytes() / 64];
+        bvh.copied(&mut Arena::over(&mut kept)).unwrap();
+        bytemuck::cast_slice(&kept).to_vec()
+    }
+
+    #[test]
+    fn any_number_of_threads_builds_the_same_bytes() {
+        let one = built(150, 1);
+        assert!(one.len() > 45_000 * 36);
+        for threads in [2, 5] {
+            assert!(built(150, threads) == one, "{threads} threads");
         }
     }
 }

@@ -7,10 +7,10 @@ mod verdict;
 
 pub use verdict::{Audited, Region};
 
+use super::deadline::End;
 use super::memory::Memory;
 use super::method::{Method, RenderSetup};
-use super::threads::{End, Threads};
-use super::workers::Workers;
+use super::threads::{Threads, Workers};
 use super::{ErrorEstimate, RenderError, Settings, Shard};
 use choice::Grid;
 use core::ops::Range;

@@ -4,8 +4,7 @@ use super::{Borrower, Method, PhotonView, Renderer};
 use crate::render::RenderError;
 use crate::render::rewritten_file::RewrittenFile;
 use crate::render::survey::Survey;
-use crate::render::threads::ThreadedRound;
-use crate::render::workers::Workers;
+use crate::render::threads::{ThreadedRound, Workers};
 use crate::save::Patience;
 use halflight_core::findings::Findings;
 

@@ -1,4 +1,6 @@
-//! Command line: commands, their exit codes and internal errors.
+//! The command line: commands, their exit codes and internal errors. `halflight --help` lists its flags,
+//! docs/cli.md its interface for scripts.
+#![forbid(unsafe_code)]
 
 mod bench;
 mod camera_args;
@@ -53,7 +55,7 @@ enum Command {
 }
 
 /// Runs the program. Exit codes are a contract (docs/cli.md).
-pub(crate) fn main() -> ExitCode {
+fn main() -> ExitCode {
     interrupt::block_file_size_signal();
     panic::set_hook(Box::new(|panic| print_message(format_args!("internal error of halflight: {panic}"))));
     let command = match Cli::try_parse() {
