@@ -20,6 +20,7 @@
 
 pub mod bench;
 pub mod compare;
+mod file_error;
 pub mod load;
 pub mod memory;
 mod pages;

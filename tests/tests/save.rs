@@ -1,6 +1,6 @@
 //! Pictures written and read back, and files with false headers.
 
-use halflight::picture::{self, PictureError};
+use halflight::picture::{self, FileError};
 use halflight::save::{Format, Image, check_writable, encode, read, read_within, to_srgb, write};
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ fn picture() -> Image {
 /// Memory limit of reading, bytes.
 const MOST: usize = 1 << 24;
 
-fn decode(bytes: &[u8]) -> Result<Image, PictureError> {
+fn decode(bytes: &[u8]) -> Result<Image, FileError> {
     picture::decode(bytes, Path::new("a"), MOST).map(Image::from)
 }
 

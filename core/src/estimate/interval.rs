@@ -66,7 +66,7 @@ impl ErrorEstimate {
     }
 
     /// Estimate from the sums over regions, for a method that also shares between distant pixels.
-    pub fn of_regions(regions: impl Iterator<Item = TileError>) -> Option<Self> {
+    pub(super) fn of_regions(regions: impl Iterator<Item = TileError>) -> Option<Self> {
         let (mut sum, mut parts, mut count) = (TileError::default(), Parts::default(), 0);
         for region in regions.filter(|region| region.values > 0) {
             parts += Parts::of([[region.difference, region.halves]]);

@@ -7,6 +7,7 @@ mod empirical_bayes;
 mod filter;
 mod interval;
 mod metric;
+mod regions;
 mod student;
 mod tile;
 mod tile_statistics;

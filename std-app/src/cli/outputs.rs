@@ -4,7 +4,6 @@
 use super::failure::Failure;
 use super::interrupt::INTERRUPT;
 use super::stdio::{print_message, print_result};
-use halflight::render;
 use halflight::report::{self, Files};
 use halflight::save::{self, Destination, Identity, Image, Patience};
 use std::io::{stderr, stdout};
@@ -90,7 +89,7 @@ impl Outputs {
     pub(super) fn plan(&mut self, role: Role, path: &Path) -> Result<(), Failure> {
         match role {
             Role::Picture | Role::Default => save::check_writable(path)?,
-            Role::Checkpoint | Role::Cache => render::check_writable(path)?,
+            Role::Checkpoint | Role::Cache => save::check_destination(path)?,
             Role::Report | Role::Standard => {}
         }
         if Destination::of(path).is_ok_and(|destination| destination.is_stdout()) {

@@ -7,7 +7,7 @@ use super::notes::Notes;
 use super::relief::{self, Relief};
 use super::texture::{self, Content};
 use crate::memory::{self, Budget, Shortage};
-use crate::picture::{self, Info, Picture, PictureError, Samples, fail};
+use crate::picture::{self, FileError, Info, Picture, Samples, fail};
 use halflight_core::scene::{Texture, TextureId, TextureTransform, Wrap};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -78,10 +78,10 @@ impl TextureSet {
         notes: &mut Notes,
     ) -> Result<(), LoadError> {
         let read = |&(file, peak): &(&PathBuf, usize)| {
-            let bytes = memory::read_file(file, peak).map_err(PictureError::new)?;
+            let bytes = memory::read_file(file, peak).map_err(FileError::new)?;
             picture::decode(&bytes, file, peak - bytes.len()).map(texture::prepared)
         };
-        let decoded: Vec<Result<Picture, PictureError>> = batch.par_iter().map(read).collect();
+        let decoded: Vec<Result<Picture, FileError>> = batch.par_iter().map(read).collect();
         for ((file, _), result) in batch.iter().zip(decoded) {
             match result {
                 Err(why) => leave_out(file, &why, required, notes)?,
@@ -188,8 +188,8 @@ impl TextureSet {
 ///
 /// # Errors
 /// The file is no picture, or needs more than `most` bytes.
-fn measure(file: &Path, most: usize) -> Result<usize, PictureError> {
-    let bytes = memory::read_file(file, most).map_err(PictureError::new)?;
+fn measure(file: &Path, most: usize) -> Result<usize, FileError> {
+    let bytes = memory::read_file(file, most).map_err(FileError::new)?;
     let Info { width, height, peak, .. } = picture::read_info(&bytes, file)?;
     if width.max(height) > LONGEST_SIDE {
         fail!("it has {width}x{height} pixels; a texture has at most {LONGEST_SIDE} a side");
@@ -204,7 +204,7 @@ fn measure(file: &Path, most: usize) -> Result<usize, PictureError> {
 /// Notes an unreadable picture; an error if it is required.
 fn leave_out(
     file: &Path,
-    why: &PictureError,
+    why: &FileError,
     required: &BTreeSet<PathBuf>,
     notes: &mut Notes,
 ) -> Result<(), LoadError> {

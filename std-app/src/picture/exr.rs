@@ -2,7 +2,7 @@
 //! parts, any data window. Only blocks of the chosen part are decompressed.
 
 use super::layers::{self, Choice};
-use super::{Info, Kind, Picture, PictureError, Samples, black, fail, pixels};
+use super::{FileError, Info, Kind, Picture, Samples, black, fail, pixels};
 use exr::block::UncompressedBlock;
 use exr::block::reader::{ChunksReader, Reader};
 use exr::math::Vec2;
@@ -30,7 +30,7 @@ struct File<'a> {
     notes: Vec<String>,
 }
 
-pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, FileError> {
     let file = open(bytes)?;
     let header = file.header();
     let of_pixel = size_of::<[f32; 3]>() + if file.choice.alpha.is_some() { size_of::<f32>() } else { 0 };
@@ -45,7 +45,7 @@ pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     Ok(Info { kind: Kind::Exr, width, height, kept, peak: kept.saturating_add(scratch) })
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
     let file = open(bytes)?;
     let (width, height, has_alpha) = (file.width, file.height, file.choice.alpha.is_some());
     // The picture is black and transparent outside the data window.
@@ -83,11 +83,11 @@ fn read_blocks(
     part: usize,
     in_parallel: bool,
     mut insert: impl FnMut(&Header, UncompressedBlock),
-) -> Result<(), PictureError> {
+) -> Result<(), FileError> {
     let is_wanted = |layer: usize, level: Vec2<usize>| layer == part && level == Vec2(0, 0);
     let chunks = reader
         .filter_chunks(false, |_, tile, block| is_wanted(block.layer, tile.level_index))
-        .map_err(PictureError::new)?;
+        .map_err(FileError::new)?;
     let insert = |meta: &exr::meta::MetaData, block: UncompressedBlock| {
         // The table and the blocks of a file may disagree.
         if is_wanted(block.index.layer, block.index.level) {
@@ -99,11 +99,11 @@ fn read_blocks(
         true => chunks.decompress_parallel(false, insert),
         false => chunks.decompress_sequential(false, insert),
     };
-    read.map_err(PictureError::new)
+    read.map_err(FileError::new)
 }
 
-fn open(bytes: &[u8]) -> Result<File<'_>, PictureError> {
-    let reader = exr::block::read(Cursor::new(bytes), false).map_err(PictureError::new)?;
+fn open(bytes: &[u8]) -> Result<File<'_>, FileError> {
+    let reader = exr::block::read(Cursor::new(bytes), false).map_err(FileError::new)?;
     let headers = reader.headers();
     let names = |header: &Header| header.channels.list.iter().map(|c| c.name.to_string()).collect();
     let parts: Vec<Vec<String>> = headers.iter().map(names).collect();
@@ -119,7 +119,7 @@ fn open(bytes: &[u8]) -> Result<File<'_>, PictureError> {
     Ok(File { reader, choice, width, height, notes })
 }
 
-fn check(header: &Header) -> Result<(), PictureError> {
+fn check(header: &Header) -> Result<(), FileError> {
     pixels(header.layer_size.x(), header.layer_size.y())?;
     let channels = &header.channels.list;
     if header.deep {

@@ -2,7 +2,7 @@
 //! columns, RGBE and XYZE, and the header lines that scale values.
 
 use super::rgbe::read_scanline;
-use super::{Info, Kind, Picture, PictureError, Samples, black, fail, filled, pixels};
+use super::{FileError, Info, Kind, Picture, Samples, black, fail, filled, pixels};
 
 /// Chromaticities of red, green, blue and white that count as sRGB: those of sRGB and of Radiance.
 const PRIMARIES: [[f64; 8]; 2] = [
@@ -61,7 +61,7 @@ impl Order {
     }
 }
 
-pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, FileError> {
     let Header { order, .. } = read_header(bytes)?;
     let Order { width, height, .. } = order;
     let kept = width * height * size_of::<[f32; 3]>();
@@ -69,7 +69,7 @@ pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     Ok(Info { kind: Kind::Hdr, width: width as u32, height: height as u32, kept, peak })
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
     let Header { order, is_xyz, applied, notes, mut rest } = read_header(bytes)?;
     let (scanlines, length) = order.scanlines();
     let (mut rgb, alpha) = black(order.width * order.height, false)?;
@@ -96,7 +96,7 @@ fn colour([r, g, b, exponent]: [u8; 4], applied: [f64; 3], is_xyz: bool) -> [f32
     if is_xyz { TO_SRGB.map(|row| row[0] * value[0] + row[1] * value[1] + row[2] * value[2]) } else { value }
 }
 
-fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
+fn read_header(bytes: &[u8]) -> Result<Header<'_>, FileError> {
     let mut rest = bytes;
     let mut header = Header {
         order: Order { width: 0, height: 0, columns: false, leftwards: false, upwards: false },
@@ -120,12 +120,12 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
             header.variable(&key.trim().to_ascii_uppercase(), value.trim())?;
         }
     }
-    Err(PictureError::new("its header has no end"))
+    Err(FileError::new("its header has no end"))
 }
 
 impl Header<'_> {
     /// Applies a line of the header.
-    fn variable(&mut self, key: &str, value: &str) -> Result<(), PictureError> {
+    fn variable(&mut self, key: &str, value: &str) -> Result<(), FileError> {
         let numbers = || value.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
         match key {
             "FORMAT" => match value.to_ascii_lowercase().as_str() {
@@ -165,10 +165,10 @@ impl Header<'_> {
 }
 
 /// The next line of the header.
-fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureError> {
+fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, FileError> {
     let bytes = *rest;
     let end =
-        bytes.iter().position(|&b| b == b'\n').ok_or_else(|| PictureError::new("its header has no end"))?;
+        bytes.iter().position(|&b| b == b'\n').ok_or_else(|| FileError::new("its header has no end"))?;
     *rest = &bytes[end + 1..];
     let line = &bytes[..end];
     // A line in another encoding is a comment.
@@ -176,8 +176,8 @@ fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureError> {
 }
 
 /// Parses `-Y 512 +X 1024`: the axis across scanlines, then the axis along them; y is up.
-fn resolution(line: &str) -> Result<Order, PictureError> {
-    let unknown = || PictureError::new(format!("`{line}` is no order of rows and columns"));
+fn resolution(line: &str) -> Result<Order, FileError> {
+    let unknown = || FileError::new(format!("`{line}` is no order of rows and columns"));
     let words: Vec<&str> = line.split_whitespace().collect();
     let [first, lines, second, length] = words[..] else { return Err(unknown()) };
     let count = |word: &str| word.parse::<u32>().map(|count| count as usize).map_err(|_| unknown());

@@ -1,7 +1,7 @@
 //! JPEG. The decoder repairs damaged files and fills missing parts with grey; a strict pass comes first, so
 //! that repairs are noted.
 
-use super::{Info, Kind, Picture, PictureError, Samples, fail, filled, pixels};
+use super::{FileError, Info, Kind, Picture, Samples, fail, filled, pixels};
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
@@ -10,7 +10,7 @@ use zune_jpeg::JpegDecoder;
 /// Bytes of the decoder for each pixel of the width: rows of blocks.
 const ROWS: usize = 1 << 10;
 
-pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, FileError> {
     let (_, width, height, channels) = open(bytes, false)?;
     let pixels = pixels(width, height)?;
     let kept = 4 * pixels;
@@ -20,7 +20,7 @@ pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     Ok(Info { kind: Kind::Jpeg, width: width as u32, height: height as u32, kept, peak })
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
     let mut notes = Vec::new();
     if !scan_markers(bytes).is_complete {
         notes.push("its end is missing, and grey or wrong in the picture".into());
@@ -40,23 +40,23 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
 }
 
 /// Grey or RGB bytes.
-fn read(bytes: &[u8], strictly: bool) -> Result<(usize, usize, Vec<u8>), PictureError> {
+fn read(bytes: &[u8], strictly: bool) -> Result<(usize, usize, Vec<u8>), FileError> {
     let (mut decoder, width, height, channels) = open(bytes, strictly)?;
     let mut raw = filled(channels * width * height, 0)?;
-    decoder.decode_into(&mut raw).map_err(PictureError::new)?;
+    decoder.decode_into(&mut raw).map_err(FileError::new)?;
     Ok((width, height, raw))
 }
 
 type Decoder<'a> = JpegDecoder<ZCursor<&'a [u8]>>;
 
 /// A decoder that has read the headers, the width, the height, and the number of channels, 1 or 3.
-fn open(bytes: &[u8], strictly: bool) -> Result<(Decoder<'_>, usize, usize, usize), PictureError> {
+fn open(bytes: &[u8], strictly: bool) -> Result<(Decoder<'_>, usize, usize, usize), FileError> {
     let options = DecoderOptions::default()
         .set_strict_mode(strictly)
         .set_max_width(usize::MAX)
         .set_max_height(usize::MAX);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    decoder.decode_headers().map_err(PictureError::new)?;
+    decoder.decode_headers().map_err(FileError::new)?;
     let (Some((width, height)), Some(colours)) = (decoder.dimensions(), decoder.input_colorspace()) else {
         fail!("it has no size");
     };

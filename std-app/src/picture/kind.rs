@@ -1,6 +1,6 @@
 //! Detection of the format by the first bytes of a file, for TGA by its name.
 
-use super::{PictureError, fail};
+use super::{FileError, fail};
 use std::path::Path;
 
 /// The format of a picture file.
@@ -34,7 +34,7 @@ impl Kind {
     ///
     /// # Errors
     /// The format is unknown.
-    pub fn of(bytes: &[u8], name: &Path) -> Result<Self, PictureError> {
+    pub fn of(bytes: &[u8], name: &Path) -> Result<Self, FileError> {
         let extension = name.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let by_name = matches!(extension.as_deref(), Some("tga" | "targa" | "icb" | "vda" | "vst"));
         Ok(match bytes {

@@ -3,7 +3,6 @@
 //! The content determines the format (the name only for TGA). The header gives the memory that decoding
 //! takes, which is compared with the limit before anything is decoded.
 
-mod error;
 mod exr;
 mod hdr;
 mod jpeg;
@@ -14,8 +13,8 @@ mod raster;
 mod rgbe;
 mod tiff;
 
-pub use error::PictureError;
-pub(crate) use error::fail;
+pub use crate::file_error::FileError;
+pub(crate) use crate::file_error::fail;
 pub use kind::Kind;
 
 use crate::report::quantity::readable_bytes;
@@ -85,7 +84,7 @@ pub struct Info {
 ///
 /// # Errors
 /// Bytes that are no picture, of an unsupported kind, or of an impossible size.
-pub fn read_info(bytes: &[u8], name: &Path) -> Result<Info, PictureError> {
+pub fn read_info(bytes: &[u8], name: &Path) -> Result<Info, FileError> {
     let kind = Kind::of(bytes, name)?;
     match kind {
         Kind::Exr => exr::info(bytes),
@@ -101,7 +100,7 @@ pub fn read_info(bytes: &[u8], name: &Path) -> Result<Info, PictureError> {
 ///
 /// # Errors
 /// Those of [`read_info`]; unreadable pixels; a picture that needs more memory.
-pub fn decode(bytes: &[u8], name: &Path, most: usize) -> Result<Picture, PictureError> {
+pub fn decode(bytes: &[u8], name: &Path, most: usize) -> Result<Picture, FileError> {
     let info = read_info(bytes, name)?;
     if info.peak > most {
         let [needed, left] = [info.peak, most].map(readable_bytes);
@@ -119,16 +118,16 @@ pub fn decode(bytes: &[u8], name: &Path, most: usize) -> Result<Picture, Picture
 }
 
 /// The number of pixels, if it is possible.
-fn pixels(width: usize, height: usize) -> Result<usize, PictureError> {
+fn pixels(width: usize, height: usize) -> Result<usize, FileError> {
     match width.checked_mul(height).filter(|&pixels| pixels <= MAX_PIXELS) {
-        Some(0) => Err(PictureError::new("it has no pixels")),
+        Some(0) => Err(FileError::new("it has no pixels")),
         Some(pixels) => Ok(pixels),
         None => fail!("it claims {width}x{height} pixels; at most {MAX_PIXELS} are read"),
     }
 }
 
 /// As [`pixels`], for a file of `bytes` bytes that each encode at most `most` pixels.
-fn plausible(width: usize, height: usize, bytes: usize, most: usize) -> Result<usize, PictureError> {
+fn plausible(width: usize, height: usize, bytes: usize, most: usize) -> Result<usize, FileError> {
     let pixels = pixels(width, height)?;
     if pixels > bytes.saturating_mul(most) {
         fail!("it claims {width}x{height} pixels but is only {bytes} bytes long: truncated or malicious");
@@ -137,14 +136,14 @@ fn plausible(width: usize, height: usize, bytes: usize, most: usize) -> Result<u
 }
 
 /// `count` copies of `value`; an error if the system has no memory.
-fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, PictureError> {
+fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, FileError> {
     let mut values = Vec::new();
-    values.try_reserve_exact(count).map_err(|_| PictureError::new("there is not enough memory for it"))?;
+    values.try_reserve_exact(count).map_err(|_| FileError::new("there is not enough memory for it"))?;
     values.resize(count, value);
     Ok(values)
 }
 
 /// Black linear pixels, and their opacity (zero) if there is one.
-fn black(pixels: usize, has_alpha: bool) -> Result<(Vec<[f32; 3]>, Vec<f32>), PictureError> {
+fn black(pixels: usize, has_alpha: bool) -> Result<(Vec<[f32; 3]>, Vec<f32>), FileError> {
     Ok((filled(pixels, [0.0; 3])?, filled(if has_alpha { pixels } else { 0 }, 0.0)?))
 }

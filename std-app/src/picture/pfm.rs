@@ -1,6 +1,6 @@
 //! Portable float map: a text header of four words, then rows of f32 from the bottom up.
 
-use super::{Info, Kind, Picture, PictureError, Samples, black, fail, pixels};
+use super::{FileError, Info, Kind, Picture, Samples, black, fail, pixels};
 
 /// The header.
 struct Header<'a> {
@@ -16,7 +16,7 @@ struct Header<'a> {
     rest: &'a [u8],
 }
 
-pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, FileError> {
     let header = read_header(bytes)?;
     let of_pixel = if header.channels == 4 { 16 } else { 12 };
     let kept = header.width * header.height * of_pixel;
@@ -24,7 +24,7 @@ pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
 }
 
 /// Colour (`PF`), grey (`Pf`) and colour with alpha (`PF4`), of either byte order.
-pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
     let Header { width, height, channels, little_endian, scale, notes, rest } = read_header(bytes)?;
     let value = |bytes: &[u8]| {
         let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
@@ -47,7 +47,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     Ok(Picture { width: width as u32, height: height as u32, samples, has_alpha, notes })
 }
 
-fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
+fn read_header(bytes: &[u8]) -> Result<Header<'_>, FileError> {
     let mut rest = bytes;
     let channels = match word(&mut rest) {
         Some("PF") => 3,
@@ -57,7 +57,7 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
     };
     let mut number = |what| {
         let text = word(&mut rest).unwrap_or("");
-        text.parse::<f64>().map_err(|_| PictureError::new(format!("not a PFM: `{text}` is no {what}")))
+        text.parse::<f64>().map_err(|_| FileError::new(format!("not a PFM: `{text}` is no {what}")))
     };
     let (width, height, scale) = (number("width")?, number("height")?, number("scale")?);
     let side = |value: f64| {

@@ -1,6 +1,6 @@
 //! PNG, BMP, TGA and WebP, decoded by the `image` crate.
 
-use super::{Info, Kind, Picture, PictureError, Samples, black, filled, plausible};
+use super::{FileError, Info, Kind, Picture, Samples, black, filled, plausible};
 use image::{ColorType, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
@@ -10,7 +10,7 @@ const PIXELS_PER_BYTE: usize = 8 * 1032;
 /// Bytes of the tables of a decoder.
 pub(super) const TABLES: usize = 1 << 19;
 
-pub(super) fn info(bytes: &[u8], kind: Kind) -> Result<Info, PictureError> {
+pub(super) fn info(bytes: &[u8], kind: Kind) -> Result<Info, FileError> {
     let decoder = open(bytes, kind)?;
     let (width, height) = decoder.dimensions();
     let most = match kind {
@@ -35,7 +35,7 @@ pub(super) fn info(bytes: &[u8], kind: Kind) -> Result<Info, PictureError> {
     Ok(Info { kind, width, height, kept, peak: raw.saturating_add(converted + scratch + TABLES) })
 }
 
-pub(super) fn decode(bytes: &[u8], info: &Info) -> Result<Picture, PictureError> {
+pub(super) fn decode(bytes: &[u8], info: &Info) -> Result<Picture, FileError> {
     let mut picture = read(open(bytes, info.kind)?)?;
     if info.kind == Kind::WebP && is_short_webp(bytes) {
         picture.notes.push("its end is missing; the rest is used".into());
@@ -44,18 +44,18 @@ pub(super) fn decode(bytes: &[u8], info: &Info) -> Result<Picture, PictureError>
 }
 
 /// The pixels of a decoder.
-pub(super) fn read(decoder: impl ImageDecoder) -> Result<Picture, PictureError> {
+pub(super) fn read(decoder: impl ImageDecoder) -> Result<Picture, FileError> {
     let (width, height) = decoder.dimensions();
     let colour = decoder.color_type();
-    let raw = usize::try_from(decoder.total_bytes()).map_err(PictureError::new)?;
+    let raw = usize::try_from(decoder.total_bytes()).map_err(FileError::new)?;
     let mut buffer = filled(raw, 0u8)?;
-    decoder.read_image(&mut buffer).map_err(PictureError::new)?;
+    decoder.read_image(&mut buffer).map_err(FileError::new)?;
     let has_alpha = colour.has_alpha();
     Ok(Picture { width, height, samples: samples(buffer, colour)?, has_alpha, notes: Vec::new() })
 }
 
 /// The decoder of a file, which has read the header.
-pub(super) fn open(bytes: &[u8], kind: Kind) -> Result<impl ImageDecoder + '_, PictureError> {
+pub(super) fn open(bytes: &[u8], kind: Kind) -> Result<impl ImageDecoder + '_, FileError> {
     let format = match kind {
         Kind::Png => ImageFormat::Png,
         Kind::Bmp => ImageFormat::Bmp,
@@ -68,7 +68,7 @@ pub(super) fn open(bytes: &[u8], kind: Kind) -> Result<impl ImageDecoder + '_, P
     let mut limits = Limits::no_limits();
     limits.max_alloc = (kind == Kind::Png).then(|| png_scratch(bytes) as u64);
     reader.limits(limits);
-    reader.into_decoder().map_err(PictureError::new)
+    reader.into_decoder().map_err(FileError::new)
 }
 
 /// Bytes that a PNG takes without its pixels: chunks, an unpacked profile, and rows.
@@ -97,7 +97,7 @@ fn is_rgba(colour: ColorType) -> bool {
 }
 
 /// The pixels with four channels.
-fn samples(buffer: Vec<u8>, colour: ColorType) -> Result<Samples, PictureError> {
+fn samples(buffer: Vec<u8>, colour: ColorType) -> Result<Samples, FileError> {
     if is_rgba(colour) {
         return Ok(Samples::Bytes(buffer));
     }
@@ -129,7 +129,7 @@ fn expanded<T: Copy>(
     pixels: usize,
     value: impl Fn(&[u8]) -> T,
     opaque: T,
-) -> Result<Vec<T>, PictureError> {
+) -> Result<Vec<T>, FileError> {
     let mut rgba = filled(4 * pixels, opaque)?;
     for (to, from) in rgba.chunks_exact_mut(4).zip(buffer.chunks_exact(channels * size)) {
         let at = |c: usize| value(&from[c * size..]);

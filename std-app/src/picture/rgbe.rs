@@ -1,12 +1,12 @@
 //! Scanlines of Radiance pictures: flat, or in one of two run-length encodings.
 
-use super::{PictureError, fail};
+use super::{FileError, fail};
 
 /// Lengths of scanlines in the newer encoding.
 const NEWER: core::ops::RangeInclusive<usize> = 8..=0x7fff;
 
 /// Reads the next scanline of `rest` into `line`: three mantissas and an exponent for each pixel.
-pub(super) fn read_scanline(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), PictureError> {
+pub(super) fn read_scanline(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), FileError> {
     match **rest {
         [2, 2, high, low, ..] if NEWER.contains(&line.len()) && high < 128 => {
             if usize::from(high) << 8 | usize::from(low) != line.len() {
@@ -20,7 +20,7 @@ pub(super) fn read_scanline(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<()
 }
 
 /// Reads one component of all pixels: runs of one value, and runs of literal values.
-fn read_component(rest: &mut &[u8], line: &mut [[u8; 4]], component: usize) -> Result<(), PictureError> {
+fn read_component(rest: &mut &[u8], line: &mut [[u8; 4]], component: usize) -> Result<(), FileError> {
     let mut pixels = line.iter_mut();
     while pixels.len() > 0 {
         let code = usize::from(take(rest)?);
@@ -40,7 +40,7 @@ fn read_component(rest: &mut &[u8], line: &mut [[u8; 4]], component: usize) -> R
 
 /// Reads flat pixels. 1 1 1 n repeats the last pixel n times, 256 n times after another repetition, and so
 /// on.
-fn read_pixels(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), PictureError> {
+fn read_pixels(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), FileError> {
     let (mut at, mut shift) = (0, 0);
     while at < line.len() {
         let pixel = [take(rest)?, take(rest)?, take(rest)?, take(rest)?];
@@ -60,9 +60,9 @@ fn read_pixels(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), PictureErro
     Ok(())
 }
 
-fn take(rest: &mut &[u8]) -> Result<u8, PictureError> {
+fn take(rest: &mut &[u8]) -> Result<u8, FileError> {
     let (&first, others) =
-        rest.split_first().ok_or_else(|| PictureError::new("truncated: pixels are missing"))?;
+        rest.split_first().ok_or_else(|| FileError::new("truncated: pixels are missing"))?;
     *rest = others;
     Ok(first)
 }
@@ -71,7 +71,7 @@ fn take(rest: &mut &[u8]) -> Result<u8, PictureError> {
 mod tests {
     use super::*;
 
-    fn line<const N: usize>(mut bytes: &[u8]) -> Result<[[u8; 4]; N], PictureError> {
+    fn line<const N: usize>(mut bytes: &[u8]) -> Result<[[u8; 4]; N], FileError> {
         let mut line = [[0; 4]; N];
         read_scanline(&mut bytes, &mut line)?;
         assert!(bytes.is_empty());

@@ -1,8 +1,7 @@
 //! Errors of a render.
 
+pub use crate::file_error::FileError;
 use halflight_core::memory::OutOfMemory;
-use std::io;
-use std::path::{Path, PathBuf};
 
 /// Reasons why there is no picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -57,35 +56,3 @@ impl From<FileError> for RenderError {
         Self::File(error)
     }
 }
-
-/// A film or cache file that cannot be read, written, continued or merged, with the reason.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FileError {
-    file: PathBuf,
-    reason: String,
-}
-
-impl FileError {
-    pub(super) fn new(file: &Path, reason: impl Into<String>) -> Self {
-        Self { file: file.to_owned(), reason: reason.into() }
-    }
-
-    /// An error of reading a file.
-    pub(super) fn io(file: &Path, error: &io::Error) -> Self {
-        let reason = match error.kind() {
-            io::ErrorKind::NotFound => "no such file".into(),
-            io::ErrorKind::PermissionDenied => "permission denied".into(),
-            io::ErrorKind::UnexpectedEof => "is damaged: it is too short".into(),
-            _ => error.to_string(),
-        };
-        Self::new(file, reason)
-    }
-}
-
-impl core::fmt::Display for FileError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{}: {}", self.file.display(), self.reason)
-    }
-}
-
-impl core::error::Error for FileError {}

@@ -1,7 +1,6 @@
 //! Error of a picture: noise from its half-films, plus bias by an audit or by photon blur.
 
 use super::audit::{Audit, Audited};
-use super::regions;
 use super::threads::Workers;
 use halflight_core::estimate::{
     BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
@@ -83,7 +82,7 @@ impl NoiseAndBlur {
 impl Workers<'_> {
     /// Error of `film`; `None` with fewer than four samples or for a black picture.
     pub(super) fn estimate(&self, film: &Film, shares: bool) -> Option<ErrorEstimate> {
-        regions::estimate(&self.errors(film)?, film.width(), shares)
+        ErrorEstimate::of_picture(&self.errors(film)?, film.width(), shares)
     }
 
     /// Error sums of the tiles of `film`; `None` for a black picture.

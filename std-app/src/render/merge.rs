@@ -56,7 +56,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         if found != 1 {
             let how = if found == 0 { "missing" } else { "there more than once" };
             let reason = format!("is one of {count} shards, of which shard {}/{count} is {how}", index + 1);
-            return Err(FileError::new(name, reason).into());
+            return Err(FileError::new(reason).at(name).into());
         }
     }
 

@@ -22,7 +22,6 @@ mod merge;
 mod method;
 mod picture;
 mod radiance_study;
-mod regions;
 mod rejected_tiles;
 mod rewritten_file;
 mod rounds;
@@ -58,7 +57,7 @@ use crate::save::Image;
 use halflight_core::Level;
 use halflight_core::findings::Findings;
 use halflight_core::transport::Counters;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Settings of a render.
@@ -262,14 +261,6 @@ pub struct RenderResult {
     pub ending: Ending,
     /// The stop rule that held, if one did.
     pub stop_rule: Option<StopRule>,
-}
-
-/// Checks that a film or cache file can be created at `path`.
-///
-/// # Errors
-/// Names the file and the reason.
-pub fn check_writable(path: &Path) -> Result<(), FileError> {
-    sealed::check_writable(path)
 }
 
 /// Most pixels of a picture.

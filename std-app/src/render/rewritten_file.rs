@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn a_failure_is_reported_once_and_cleared_by_the_next_write() {
         let mut file = RewrittenFile::in_file(Some(Path::new("film")));
-        let fail = |path: &Path, _: Patience| Err(FileError::new(path, "cannot be written"));
+        let fail = |path: &Path, _: Patience| Err(FileError::new("cannot be written").at(path));
         file.update(fail);
         assert_eq!(
             file.new_failure().map(|error| error.to_string()).as_deref(),

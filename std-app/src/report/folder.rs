@@ -1,7 +1,7 @@
 //! Folder of a report: checked before a long render, written after it.
 
 use super::Files;
-use crate::save::{Destination, Patience, PictureError, check_destination, io_reason, not_written, replace};
+use crate::save::{Destination, FileError, Patience, check_destination, replace};
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -25,21 +25,19 @@ pub fn report_files(folder: &Path) -> [PathBuf; 3] {
 ///
 /// # Errors
 /// Folder or file that cannot be used, with the reason and advice.
-pub fn check_folder(folder: &Path) -> Result<(), PictureError> {
-    let refuse = |reason: String| PictureError::new(reason).at(folder);
+pub fn check_folder(folder: &Path) -> Result<(), FileError> {
     if folder.exists() && !folder.is_dir() {
-        return Err(refuse("cannot hold a report: it is a file, not a folder".into()));
+        return Err(FileError::new("cannot hold a report: it is a file, not a folder").at(folder));
     }
     if !folder.exists() {
         // The parent folder must exist and be writable, as for a file.
-        return check_destination(folder).map_err(refuse);
+        return check_destination(folder);
     }
     for (path, (_, marks)) in report_files(folder).iter().zip(FILES) {
-        check_destination(path).map_err(|why| PictureError::new(why).at(path))?;
-        let is_ours = is_ours(path, marks);
-        if !is_ours.map_err(|error| PictureError::new(not_written(&error)).at(path))? {
+        check_destination(path)?;
+        if !is_ours(path, marks).map_err(|error| FileError::not_written(&error).at(path))? {
             let why = "is not part of a report and would be overwritten: choose another folder";
-            return Err(PictureError::new(why).at(path));
+            return Err(FileError::new(why).at(path));
         }
     }
     Ok(())
@@ -61,12 +59,12 @@ fn is_ours(path: &Path, marks: &[&str]) -> io::Result<bool> {
 ///
 /// # Errors
 /// Every file that was not written, with the reason.
-pub fn write_folder(folder: &Path, files: &Files, patience: Patience) -> Result<(), Vec<PictureError>> {
+pub fn write_folder(folder: &Path, files: &Files, patience: Patience) -> Result<(), Vec<FileError>> {
     if !folder.is_dir()
         && let Err(error) = Destination::of(folder).and_then(|destination| fs::create_dir(destination.path()))
     {
-        let why = format!("cannot be created: {}", io_reason(&error));
-        return Err(vec![PictureError::new(why).at(folder)]);
+        let why = format!("cannot be created: {}", FileError::io(&error));
+        return Err(vec![FileError::new(why).at(folder)]);
     }
     let write = |(name, bytes): &(&str, Vec<u8>)| replace(&folder.join(name), bytes, patience).err();
     let failed: Vec<_> = files.iter().filter_map(write).collect();

@@ -5,7 +5,7 @@
 use super::destination::{Destination, folder};
 use super::partial_file::PartialFile;
 use super::stream::{self, Patience};
-use super::{Format, Image, PictureError, encode};
+use super::{FileError, Format, Image, encode};
 use crate::memory::{self, Budget};
 use crate::picture::{self, Kind};
 use std::fs::{File, OpenOptions};
@@ -20,10 +20,9 @@ const BUFFER: usize = 1 << 20;
 ///
 /// # Errors
 /// An unreadable picture; the message names the file.
-pub fn read_within(path: &Path, most: usize) -> Result<(Image, Vec<String>), PictureError> {
-    let bytes =
-        memory::read_file(path, most).map_err(|error| PictureError::new(io_reason(&error)).at(path))?;
-    let about = |error: PictureError| error.at(path);
+pub fn read_within(path: &Path, most: usize) -> Result<(Image, Vec<String>), FileError> {
+    let bytes = memory::read_file(path, most).map_err(|error| FileError::io(&error).at(path))?;
+    let about = |error: FileError| error.at(path);
     let info = picture::read_info(&bytes, path).map_err(about)?;
     // Integers become floats, in memory of their own.
     let image = match info.kind {
@@ -40,7 +39,7 @@ pub fn read_within(path: &Path, most: usize) -> Result<(Image, Vec<String>), Pic
 ///
 /// # Errors
 /// An unreadable picture; the message names the file.
-pub fn read(path: &Path) -> Result<Image, PictureError> {
+pub fn read(path: &Path) -> Result<Image, FileError> {
     read_within(path, Budget::new(None).limit()).map(|(image, _)| image)
 }
 
@@ -49,7 +48,7 @@ pub fn read(path: &Path) -> Result<Image, PictureError> {
 ///
 /// # Errors
 /// A file that cannot be written; the message names it.
-pub fn write(path: &Path, image: &Image) -> Result<(), PictureError> {
+pub fn write(path: &Path, image: &Image) -> Result<(), FileError> {
     write_with(path, image, Patience::least())
 }
 
@@ -57,15 +56,14 @@ pub fn write(path: &Path, image: &Image) -> Result<(), PictureError> {
 ///
 /// # Errors
 /// A file that cannot be written; the message names it.
-pub fn write_with(path: &Path, image: &Image, patience: Patience) -> Result<(), PictureError> {
+pub fn write_with(path: &Path, image: &Image, patience: Patience) -> Result<(), FileError> {
     let bytes = encode(image, Format::of(path)?).map_err(|error| error.at(path))?;
     replace(path, &bytes, patience)
 }
 
 /// Writes `bytes` to a file atomically.
-pub(crate) fn replace(path: &Path, bytes: &[u8], patience: Patience) -> Result<(), PictureError> {
+pub(crate) fn replace(path: &Path, bytes: &[u8], patience: Patience) -> Result<(), FileError> {
     replace_with(path, patience, |file| file.write_all(bytes))
-        .map_err(|error| PictureError::new(not_written(&error)).at(path))
 }
 
 /// Writes the output of `put` to a file atomically.
@@ -73,16 +71,19 @@ pub(crate) fn replace_with(
     path: &Path,
     patience: Patience,
     put: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<()> {
-    let destination = Destination::of(path)?;
-    if destination.is_stream() {
-        let mut bytes = Vec::new();
-        put(&mut bytes)?;
-        return stream::write(&destination, bytes, patience);
-    }
-    let (part, file) = PartialFile::create(destination.path())?;
-    fill(file, put)?;
-    part.rename(destination.path())
+) -> Result<(), FileError> {
+    let written = || {
+        let destination = Destination::of(path)?;
+        if destination.is_stream() {
+            let mut bytes = Vec::new();
+            put(&mut bytes)?;
+            return stream::write(&destination, bytes, patience);
+        }
+        let (part, file) = PartialFile::create(destination.path())?;
+        fill(file, put)?;
+        part.rename(destination.path())
+    };
+    written().map_err(|error| FileError::not_written(&error).at(path))
 }
 
 fn fill(file: File, put: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
@@ -96,53 +97,35 @@ fn fill(file: File, put: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::R
 ///
 /// # Errors
 /// A file that cannot be written; the message names it and the remedy.
-pub fn check_writable(path: &Path) -> Result<(), PictureError> {
+pub fn check_writable(path: &Path) -> Result<(), FileError> {
     Format::of(path)?;
-    check_destination(path).map_err(|why| PictureError::new(why).at(path))
+    check_destination(path)
 }
 
-/// As [`check_writable`], for files other than pictures; the error is the reason.
-pub(crate) fn check_destination(path: &Path) -> Result<(), String> {
-    let destination = Destination::of(path).map_err(|error| not_written(&error))?;
+/// As [`check_writable`], for files other than pictures.
+///
+/// # Errors
+/// A file that cannot be written; the message names it and the remedy.
+pub fn check_destination(path: &Path) -> Result<(), FileError> {
+    let refuse = |why: String| Err(FileError::new(format!("cannot be written{why}")).at(path));
+    let destination = Destination::of(path).map_err(|error| FileError::not_written(&error).at(path))?;
     if destination.is_folder() {
-        return Err("cannot be written: it is a folder".into());
+        return refuse(": it is a folder".into());
     }
     if destination.is_stream() {
         return Ok(());
     }
     let (target, folder) = (destination.path(), folder(destination.path()));
     if target.file_name().is_none() || !folder.is_dir() {
-        return Err(format!("cannot be written: there is no folder {}", folder.display()));
+        return refuse(format!(": there is no folder {}", folder.display()));
     }
     if target.exists()
         && let Err(error) = OpenOptions::new().append(true).open(target)
     {
-        return Err(not_written(&error));
+        return Err(FileError::not_written(&error).at(path));
     }
-    let created = PartialFile::create(target);
-    created
-        .map(drop)
-        .map_err(|error| format!("cannot be written in {}: {}", folder.display(), io_reason(&error)))
-}
-
-/// The reason why a file was not written.
-pub(crate) fn not_written(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "cannot be written: its folder does not exist any more".into(),
-        _ => format!("cannot be written: {}", io_reason(error)),
-    }
-}
-
-/// The error, without the error number of the system.
-pub(crate) fn io_reason(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "no such file".into(),
-        io::ErrorKind::PermissionDenied => "permission denied".into(),
-        io::ErrorKind::StorageFull => "the disk is full".into(),
-        io::ErrorKind::QuotaExceeded => "the quota is used up".into(),
-        io::ErrorKind::FileTooLarge => "it would be larger than files may be here".into(),
-        io::ErrorKind::ReadOnlyFilesystem => "the disk is read-only".into(),
-        io::ErrorKind::BrokenPipe => "its reader is gone".into(),
-        _ => error.to_string(),
+    match PartialFile::create(target) {
+        Ok(_) => Ok(()),
+        Err(error) => refuse(format!(" in {}: {}", folder.display(), FileError::io(&error))),
     }
 }

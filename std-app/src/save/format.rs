@@ -1,7 +1,7 @@
 //! File formats of pictures, and their encoders.
 
 use super::Image;
-use crate::picture::{MAX_PIXELS, PictureError, fail};
+use crate::picture::{FileError, MAX_PIXELS, fail};
 use exr::image::{Blocks, Encoding, SpecificChannels};
 use exr::math::Vec2;
 use exr::prelude::{Compression, LineOrder, WritableImage};
@@ -41,12 +41,12 @@ impl Format {
     ///
     /// # Errors
     /// The name ends in none of the four extensions.
-    pub fn of(path: &Path) -> Result<Format, PictureError> {
+    pub fn of(path: &Path) -> Result<Format, FileError> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         Format::ALL
             .into_iter()
             .find(|format| extension.as_deref() == Some(format.extension()))
-            .ok_or_else(|| PictureError::new("the name must end in .png, .exr, .hdr or .pfm").at(path))
+            .ok_or_else(|| FileError::new("the name must end in .png, .exr, .hdr or .pfm").at(path))
     }
 
     /// Whether the values are linear radiance and not display values.
@@ -59,7 +59,7 @@ impl Format {
 ///
 /// # Errors
 /// A picture without pixels or with more than [`MAX_PIXELS`].
-pub fn encode(image: &Image, format: Format) -> Result<Vec<u8>, PictureError> {
+pub fn encode(image: &Image, format: Format) -> Result<Vec<u8>, FileError> {
     if image.pixels.is_empty() || image.pixels.len() > MAX_PIXELS {
         fail!("{}x{} pixels cannot be written", image.width, image.height);
     }
@@ -83,17 +83,17 @@ pub fn from_srgb(display: f32) -> f32 {
     if display <= 0.040_45 { display / 12.92 } else { ((display + 0.055) / 1.055).powf(2.4) }
 }
 
-fn encode_png(picture: &Image) -> Result<Vec<u8>, PictureError> {
+fn encode_png(picture: &Image) -> Result<Vec<u8>, FileError> {
     let display = |&value: &f32| (to_srgb(value) * 255.0 + 0.5) as u8;
     let samples: Vec<u8> = picture.pixels.iter().flatten().map(display).collect();
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
         .write_image(&samples, picture.width, picture.height, ExtendedColorType::Rgb8)
-        .map_err(PictureError::new)?;
+        .map_err(FileError::new)?;
     Ok(bytes)
 }
 
-fn encode_exr(picture: &Image) -> Result<Vec<u8>, PictureError> {
+fn encode_exr(picture: &Image) -> Result<Vec<u8>, FileError> {
     let size = Vec2(picture.width as usize, picture.height as usize);
     let pixel = |at: Vec2<usize>| <(f32, f32, f32)>::from(picture.pixels[at.y() * size.x() + at.x()]);
     let (compression, blocks, line_order) = (Compression::ZIP16, Blocks::ScanLines, LineOrder::Increasing);
@@ -102,20 +102,20 @@ fn encode_exr(picture: &Image) -> Result<Vec<u8>, PictureError> {
     exr::image::Image::from_encoded_channels(size, encoding, SpecificChannels::rgb(pixel))
         .write()
         .to_buffered(Cursor::new(&mut bytes))
-        .map_err(PictureError::new)?;
+        .map_err(FileError::new)?;
     Ok(bytes)
 }
 
 /// Largest value of RGBE: 8 bits of mantissa and a common exponent.
 const LARGEST_RGBE: f32 = 255.0 / 256.0 * 1.701_411_8e38;
 
-fn encode_hdr(picture: &Image) -> Result<Vec<u8>, PictureError> {
+fn encode_hdr(picture: &Image) -> Result<Vec<u8>, FileError> {
     let storable = |value: f32| value.clamp(0.0, LARGEST_RGBE).max(0.0);
     let pixels: Vec<Rgb<f32>> = picture.pixels.iter().map(|pixel| Rgb(pixel.map(storable))).collect();
     let mut bytes = Vec::new();
     HdrEncoder::new(&mut bytes)
         .encode(&pixels, picture.width as usize, picture.height as usize)
-        .map_err(PictureError::new)?;
+        .map_err(FileError::new)?;
     Ok(bytes)
 }
 

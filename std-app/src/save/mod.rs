@@ -7,10 +7,11 @@ mod image;
 mod partial_file;
 mod stream;
 
-pub use crate::picture::{MAX_PIXELS, PictureError};
+pub use crate::file_error::FileError;
+pub use crate::picture::MAX_PIXELS;
 pub use destination::{Destination, Identity};
-pub(crate) use file::{check_destination, io_reason, not_written, replace, replace_with};
-pub use file::{check_writable, read, read_within, write, write_with};
+pub use file::{check_destination, check_writable, read, read_within, write, write_with};
+pub(crate) use file::{replace, replace_with};
 pub use format::{Format, encode, from_srgb, to_srgb};
 pub use image::Image;
 pub use partial_file::abandon;

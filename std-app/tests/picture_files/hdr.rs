@@ -1,7 +1,7 @@
 //! Radiance: orders of rows, factors in the header, XYZ.
 
 use super::*;
-fn read(text: &str, pixels: &[[u8; 4]]) -> Result<Picture, PictureError> {
+fn read(text: &str, pixels: &[[u8; 4]]) -> Result<Picture, FileError> {
     read_bytes(&[text.as_bytes(), pixels.as_flattened()].concat())
 }
 

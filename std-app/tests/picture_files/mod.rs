@@ -9,7 +9,7 @@ mod pfm;
 mod raster;
 mod tiff;
 
-use halflight::picture::{self, Kind, Picture, PictureError, Samples};
+use halflight::picture::{self, FileError, Kind, Picture, Samples};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -17,6 +17,6 @@ use std::path::Path;
 const MOST: usize = 1 << 24;
 
 /// The picture of `bytes`, whose name says nothing.
-fn read_bytes(bytes: &[u8]) -> Result<Picture, PictureError> {
+fn read_bytes(bytes: &[u8]) -> Result<Picture, FileError> {
     picture::decode(bytes, Path::new("a"), MOST)
 }

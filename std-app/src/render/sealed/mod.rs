@@ -10,7 +10,7 @@ pub(super) use hash::Hash;
 
 use super::error::FileError;
 use crate::memory::Shortage;
-use crate::save::{Patience, check_destination, not_written, replace_with};
+use crate::save::{Patience, replace_with};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::File;
@@ -64,7 +64,7 @@ pub(super) fn write(
     patience: Patience,
     sections: impl FnOnce(&mut Writer) -> io::Result<()>,
 ) -> Result<(), FileError> {
-    let written = replace_with(path, patience, |file| {
+    replace_with(path, patience, |file| {
         let mut writer = Writer { file, hash: Hash::default() };
         writer.put(&kind.opening())?;
         let header = serde_json::to_vec(header)?;
@@ -73,13 +73,7 @@ pub(super) fn write(
         sections(&mut writer)?;
         let Writer { file, hash } = writer;
         file.write_all(&hash.value().to_le_bytes())
-    });
-    written.map_err(|error| FileError::new(path, not_written(&error)))
-}
-
-/// Checks that a file can be created at `path`.
-pub(super) fn check_writable(path: &Path) -> Result<(), FileError> {
-    check_destination(path).map_err(|why| FileError::new(path, why))
+    })
 }
 
 /// A file after its header was read.
@@ -100,8 +94,8 @@ impl<'r> Reader<'r> {
         kind: &Kind,
         most: usize,
     ) -> Result<(Self, H), FileError> {
-        let file = File::open(path).map_err(|error| FileError::io(path, &error))?;
-        let length = file.metadata().map_err(|error| FileError::io(path, &error))?.len();
+        let file = File::open(path).map_err(|error| FileError::io(&error).at(path))?;
+        let length = file.metadata().map_err(|error| FileError::io(&error).at(path))?.len();
         Self::read(path, kind, (Box::new(BufReader::with_capacity(1 << 16, file)), length), most)
     }
 
@@ -135,7 +129,7 @@ impl<'r> Reader<'r> {
         reader.expect(u64::from(length), HEADER)?;
         let mut text = Vec::new();
         let limited = reader.file.by_ref().take(u64::from(length)).read_to_end(&mut text);
-        limited.map_err(|error| FileError::io(path, &error))?;
+        limited.map_err(|error| FileError::io(&error).at(path))?;
         if text.len() != length as usize {
             return Err(reader.damage("it is too short"));
         }
@@ -161,7 +155,7 @@ impl<'r> Reader<'r> {
 
     /// Reads the next section into `bytes`.
     pub(super) fn get(&mut self, bytes: &mut [u8]) -> Result<(), FileError> {
-        self.file.read_exact(bytes).map_err(|error| FileError::io(&self.path, &error))?;
+        self.file.read_exact(bytes).map_err(|error| FileError::io(&error).at(&self.path))?;
         self.hash.section(bytes);
         Ok(())
     }
@@ -169,8 +163,8 @@ impl<'r> Reader<'r> {
     /// Verifies the checksum and the end of the file.
     pub(super) fn finish(mut self) -> Result<(), FileError> {
         let mut sum = [0; 8];
-        self.file.read_exact(&mut sum).map_err(|error| FileError::io(&self.path, &error))?;
-        let more = self.file.read(&mut [0]).map_err(|error| FileError::io(&self.path, &error))?;
+        self.file.read_exact(&mut sum).map_err(|error| FileError::io(&error).at(&self.path))?;
+        let more = self.file.read(&mut [0]).map_err(|error| FileError::io(&error).at(&self.path))?;
         if u64::from_le_bytes(sum) != self.hash.value() || more > 0 {
             return Err(self.damage("its checksum is wrong"));
         }
@@ -183,8 +177,8 @@ impl<'r> Reader<'r> {
     }
 
     /// An error for a file that cannot be used.
-    pub(super) fn refusal(&self, reason: impl Into<String>) -> FileError {
-        FileError::new(&self.path, reason)
+    pub(super) fn refusal(&self, reason: impl core::fmt::Display) -> FileError {
+        FileError::new(reason).at(&self.path)
     }
 
     /// An error for a damaged file.
