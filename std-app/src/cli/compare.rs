@@ -57,13 +57,8 @@ impl Difference {
         }
     }
 
-    const fn name(self) -> &'static str {
-        match self {
-            Difference::Signed => "signed",
-            Difference::Absolute => "absolute",
-            Difference::Relative => "relative",
-            Difference::Flip => "flip",
-        }
+    fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 }
 

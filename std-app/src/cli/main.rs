@@ -5,12 +5,10 @@
 mod bench;
 mod camera_args;
 mod compare;
-mod dropped;
 mod failure;
 mod info;
 mod interrupt;
 mod merge;
-mod method_args;
 mod outputs;
 mod picture_args;
 mod progress;

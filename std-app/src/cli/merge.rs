@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
-use super::{dropped, summary};
+use super::summary;
 use clap::Args;
 use halflight::render::{self, Merged};
 use halflight::report::{dropped_object, error_object};
@@ -67,6 +67,6 @@ fn text(merged: &Merged, saved: &[&PathBuf]) -> String {
         Some(audit) => lines.extend(summary::audited(audit)),
         None => lines.extend(summary::estimate(merged.error, merged.noise_and_blur, merged.is_biased)),
     }
-    lines.extend(dropped::text(&merged.counters, &merged.rejected_tiles, merged.empty_pixels));
+    lines.extend(summary::rejected(&merged.counters, &merged.rejected_tiles, merged.empty_pixels));
     lines.join("\n")
 }

@@ -2,9 +2,8 @@
 
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
-use super::method_args::MethodArgs;
 use super::outputs::Outputs;
-use super::picture_args::{PictureArgs, file_name, render_failure};
+use super::picture_args::{MethodArgs, PictureArgs, file_name, render_failure};
 use super::progress::ProgressReporter;
 use super::race_entry::{RaceEntry, race_entry};
 use super::{print_note, values};
@@ -73,7 +72,7 @@ impl Race {
         loaded.repairs.iter().for_each(print_note);
         let stop = Stop { seconds: Some(self.time), ..Stop::default() };
         let settings = |entry: &RaceEntry| {
-            let args = entry.args.over(&self.method_args);
+            let args = entry.args(&self.method_args)?;
             self.picture.settings(&loaded, entry.method, &args, stop, reference.clone())
         };
         let all = self.methods.iter().map(settings).collect::<Result<Vec<_>, _>>()?;

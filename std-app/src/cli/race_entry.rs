@@ -1,7 +1,7 @@
 //! Method of a race: `NAME[:OPTION[=VALUE]]…` as in `path:max-depth=2:seed=7`. Options are the flags of
 //! [`MethodArgs`] without dashes, so every new flag is an option as well.
 
-use super::method_args::{MethodArg, MethodArgs};
+use super::picture_args::{MethodArg, MethodArgs};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, ValueEnum};
 
@@ -11,7 +11,18 @@ pub(super) struct RaceEntry {
     /// Text of the command line.
     pub(super) name: String,
     pub(super) method: MethodArg,
-    pub(super) args: MethodArgs,
+    /// Its options as flags, which are valid.
+    flags: Vec<String>,
+}
+
+impl RaceEntry {
+    /// The settings of the race with its own, which win.
+    pub(super) fn args(&self, race: &MethodArgs) -> Result<MethodArgs, clap::Error> {
+        let mut flags = Flags { args: race.clone() };
+        flags.try_update_from(&self.flags)?;
+        flags.args.precise |= race.precise;
+        Ok(flags.args)
+    }
 }
 
 /// Options as flags.
@@ -32,8 +43,8 @@ pub(super) fn race_entry(text: &str) -> Result<RaceEntry, String> {
     if flags.iter().any(|flag| flag == "--") {
         return Err("no option follows the colon".into());
     }
-    let args = Flags::try_parse_from(&flags).map_err(|error| message(&error))?.args;
-    Ok(RaceEntry { name: text.trim().into(), method, args })
+    Flags::try_parse_from(&flags).map_err(|error| message(&error))?;
+    Ok(RaceEntry { name: text.trim().into(), method, flags })
 }
 
 /// Message of clap in terms of options.
@@ -62,12 +73,15 @@ mod tests {
         assert_eq!(plain.name, "path");
         let special = race_entry("auto:max-depth=3:precise:seed=7").unwrap();
         assert_eq!(special.name, "auto:max-depth=3:precise:seed=7");
-        let args = format!("{:?}", special.args);
-        for part in ["max_depth: Some(3)", "seed: Some(7)", "precise: true"] {
-            assert!(args.contains(part), "{args}");
+        let race = Flags::parse_from::<_, &str>([]).args;
+        let args = |entry: &RaceEntry, race| entry.args(race).unwrap();
+        let own = args(&special, &race);
+        for (args, seed) in [(&own, 7), (&args(&race_entry("path:seed=1").unwrap(), &own), 1)] {
+            let args = format!("{args:?}");
+            for part in ["max_depth: Some(3)", &format!("seed: Some({seed})"), "precise: true"] {
+                assert!(args.contains(part), "{args}");
+            }
         }
-        let args = format!("{:?}", race_entry("path:seed=1").unwrap().args.over(&special.args));
-        assert!(args.contains("max_depth: Some(3)") && args.contains("seed: Some(1)"), "{args}");
     }
 
     #[test]

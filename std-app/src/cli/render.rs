@@ -2,9 +2,8 @@
 
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
-use super::method_args::{MethodArg, MethodArgs};
 use super::outputs::{Outputs, Role};
-use super::picture_args::{PictureArgs, file_name, render_failure};
+use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, render_failure};
 use super::progress::ProgressReporter;
 use super::{print_note, summary, values};
 use clap::{Args, ValueEnum};

@@ -1,8 +1,7 @@
 //! `halflight study`: experiments on parts of a method.
 
 use super::failure::Failure;
-use super::method_args::{MethodArg, MethodArgs};
-use super::picture_args::{PictureArgs, render_failure};
+use super::picture_args::{MethodArg, MethodArgs, PictureArgs, render_failure};
 use super::stdio::{print_note, print_result};
 use super::study_radiance::Radiance;
 use super::values;

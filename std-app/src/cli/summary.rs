@@ -1,11 +1,11 @@
 //! Summary of a render as text.
 
 use super::compare as comparing;
-use super::dropped;
-use halflight::render::{Audited, BiasEstimate, Ending, ErrorEstimate, NoiseAndBlur, StopRule};
+use halflight::render::{Audited, BiasEstimate, Ending, ErrorEstimate, NoiseAndBlur, RejectedTile, StopRule};
 use halflight::report::Run;
 use halflight::report::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
 use halflight_core::findings::{Finding, Value};
+use halflight_core::transport::Counters;
 use std::path::Path;
 
 /// Lines of `run`; `report` is the folder of its report. `by_default` is true if the user gave no stop rule.
@@ -64,7 +64,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>, by_default: bool) -> String
         readable_bytes(result.memory.iter().map(|part| part.bytes).sum()),
         readable_bytes(result.memory_peak),
     ));
-    lines.extend(dropped::text(&result.counters, &result.rejected_tiles, result.empty_pixels));
+    lines.extend(rejected(&result.counters, &result.rejected_tiles, result.empty_pixels));
     if result.filled_pixels > 0 {
         let pixels = plural(result.filled_pixels, "pixel");
         lines.push(format!("       {pixels} without a sample show the mean of their neighbours"));
@@ -145,4 +145,32 @@ pub(super) fn estimate(
         }
         None => vec![format!("{error}, noise alone{}", bias.replace("other bias", "bias"))],
     }
+}
+
+/// Lines on rejected samples with causes and the worst tile; none if there are none.
+pub(super) fn rejected(counters: &Counters, tiles: &[RejectedTile], empty_pixels: u64) -> Vec<String> {
+    let dropped = &counters.dropped;
+    if dropped.total() == 0 {
+        return Vec::new();
+    }
+    let mut lines = vec![format!(
+        "dropped {} of {} samples: {} not a number, {} infinite, {} negative, {} unfinished",
+        dropped.total(),
+        counters.paths,
+        dropped.nan,
+        dropped.infinite,
+        dropped.negative,
+        dropped.unfinished
+    )];
+    lines.extend(tiles.first().map(|worst| {
+        let (count, x, y) = (worst.dropped.total(), worst.x, worst.y);
+        format!(
+            "       in {}, most of them ({count}) in the tile at ({x}, {y})",
+            plural(tiles.len() as u64, "tile")
+        )
+    }));
+    if empty_pixels > 0 {
+        lines.push(format!("       {} without any sample left: black", plural(empty_pixels, "pixel")));
+    }
+    lines
 }

@@ -23,7 +23,6 @@ mod open_glass;
 mod relief;
 mod scene;
 pub mod scene_file;
-mod settings;
 mod split;
 mod surface;
 mod texcoords;
@@ -36,8 +35,7 @@ pub use error::LoadError;
 pub use map::{Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
-pub use scene::{LoadedScene, SceneViews, View};
-pub use settings::RenderSettings;
+pub use scene::{LoadedScene, RenderSettings, SceneViews, View};
 pub use texture_set::TextureSet;
 pub use transform::{SceneTransform, direction};
 

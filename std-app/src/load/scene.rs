@@ -1,12 +1,12 @@
 //! A loaded scene: the buffers that the core borrows, their files and repairs.
 
 use super::far_camera::start;
-use super::settings::RenderSettings;
 use super::texture_set::TextureSet;
 use super::transform::{SceneTransform, direction};
 use glam::{DVec3, Vec3};
 use halflight_core::geometry::Bounds;
 use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
+use serde::Deserialize;
 use std::path::PathBuf;
 
 /// A scene with its buffers, in the coordinates of the core.
@@ -43,6 +43,26 @@ pub struct LoadedScene {
     pub files: Vec<PathBuf>,
     /// Repairs, one sentence for each kind.
     pub repairs: Vec<String>,
+}
+
+/// Render settings of a scene file, which flags of the command line override; `None` if not given.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RenderSettings {
+    /// Width and height in pixels.
+    pub size: Option<[u32; 2]>,
+    /// Samples per pixel.
+    pub spp: Option<u32>,
+    /// Rendering time limit, in seconds.
+    pub time: Option<f64>,
+    /// relMSE at which to stop.
+    pub error: Option<f64>,
+    /// Longest path, in segments; 1: directly visible light.
+    pub max_depth: Option<u32>,
+    /// Seed of all random numbers.
+    pub seed: Option<u32>,
+    /// Name of the method.
+    pub method: Option<String>,
 }
 
 /// Position and direction of a camera, in the coordinates of the files.
