@@ -73,14 +73,22 @@ impl<'w> Workers<'w> {
         self.install(|| Bvh::build_with(mesh, arena, level, &self.fork))
     }
 
-    /// Runs `work` once on every thread, each with its own working memory.
-    pub(super) fn on_all<T: Send>(
+    /// Runs `work` once on every thread, each with its own working memory. The parallel iterator is compiled
+    /// once, since passes hand it a trait object.
+    fn on_all(
         &self,
         scratch: &mut [Vec<Line>],
-        work: impl Fn(&mut Arena) -> Result<T, OutOfMemory> + Sync,
-    ) -> Result<Vec<T>, OutOfMemory> {
+        work: &(dyn Fn(&mut Arena) -> Result<Passed, OutOfMemory> + Sync),
+    ) -> Result<Passed, OutOfMemory> {
         let one = |lines: &mut Vec<Line>| work(&mut Arena::over(lines));
-        self.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
+        let passed = self.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect::<Vec<_>>());
+        let mut all = Passed { counters: Counters::default(), is_complete: true };
+        for passed in passed {
+            let Passed { counters, is_complete } = passed?;
+            all.counters += counters;
+            all.is_complete &= is_complete;
+        }
+        Ok(all)
     }
 }
 
@@ -139,7 +147,7 @@ impl<'t> Threads<'t> {
         let branches = &*branches;
         let queue = Mutex::new(queue);
         let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
-        let passed = workers.on_all(scratch, |arena| {
+        workers.on_all(scratch, &|arena| {
             let is_over = || branches.is_over();
             let mut worker = Worker::new(arena.scratch(), &is_over);
             let mut counters = Counters::default();
@@ -150,13 +158,7 @@ impl<'t> Threads<'t> {
                 counters += task(number, piece, &mut worker)?;
             }
             Ok(Passed { counters, is_complete: true })
-        })?;
-        let mut all = Passed { counters: Counters::default(), is_complete: true };
-        for Passed { counters, is_complete } in passed {
-            all.counters += counters;
-            all.is_complete &= is_complete;
-        }
-        Ok(all)
+        })
     }
 }
 
