@@ -15,11 +15,6 @@ pub(crate) const CAUSTIC_ALPHA: f32 = 0.1;
 const MIN_BASE_ALBEDO: f32 = 0.05;
 
 impl Surface {
-    /// True if the surface may be purely diffuse somewhere.
-    pub fn may_be_diffuse(&self) -> bool {
-        matches!(self, Surface::Diffuse { .. } | Surface::Glossy { ior: None, .. })
-    }
-
     /// True if the surface may have a diffuse component somewhere, with or without a coat.
     pub fn may_have_base(&self) -> bool {
         matches!(self, Surface::Diffuse { .. } | Surface::Glossy { .. })

@@ -47,12 +47,6 @@ impl<'a> Mesh<'a> {
         self.vertices(index).map(|v| self.positions.get(v as usize).copied().unwrap_or_default().into())
     }
 
-    /// Shading normals at the corners; zeros without any.
-    #[inline]
-    pub fn corner_normals(&self, index: u32) -> [Vec3; 3] {
-        self.vertices(index).map(|v| self.normals.get(v as usize).copied().unwrap_or_default().into())
-    }
-
     /// Texture coordinates at the corners; zeros without any.
     #[inline]
     pub fn corner_texcoords(&self, index: u32) -> [Vec2; 3] {

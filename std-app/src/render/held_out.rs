@@ -1,10 +1,11 @@
 //! Held-out points of a picture, for which no record was made, with their exact indirect irradiance.
 
 use super::RenderError;
+use crate::memory::lines;
 use halflight_core::Rgb;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::Arena;
 use halflight_core::method::Executor;
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
@@ -61,7 +62,7 @@ pub(super) fn held_out<F: Features>(
     let places = places.into_iter().enumerate().filter(|(_, place)| place.is_some());
     let places: Vec<_> = places.map(|(i, place)| (place, pixel(i))).collect();
 
-    let mut tables = vec![Line([0; 64]); CellFlux::footprint(EXACT).bytes() / 64];
+    let mut tables = lines(CellFlux::footprint(EXACT))?;
     let flux = CellFlux::build(EXACT, &mut Arena::over(&mut tables))?;
     let gathering =
         Gathering { flux: &flux, metric: metric::Settings::new(Metric::MinDistance, 1.0), least_pixels: 0.0 };

@@ -1,8 +1,9 @@
 //! Kernels with exact answers: rays against boxes in f64, photon searches against brute force.
 
 use super::Table;
+use crate::memory::lines;
 use glam::{DVec3, Vec3};
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::Arena;
 use halflight_core::photon::{Neighbours, Photon, PhotonMap, Photons, brute};
 use halflight_core::sampling::Random;
 use halflight_core::{Level, Rgb};
@@ -110,8 +111,8 @@ fn photons(table: &mut Table) {
     for (name, cloud) in clouds {
         let random = Random::new(7, 0);
         let position = |i: u32| cloud(&|k| random.single(4 * i + k), i);
-        let mut lines = vec![Line([0; 64]); Photons::footprint(COUNT as usize).bytes().div_ceil(64)];
-        let mut arena = Arena::over(&mut lines);
+        let Ok(mut memory) = lines(Photons::footprint(COUNT as usize)) else { continue };
+        let mut arena = Arena::over(&mut memory);
         let Ok(mut photons) = Photons::new(COUNT as usize, &mut arena) else { continue };
         for (i, photon) in photons.as_mut_slice().iter_mut().enumerate() {
             *photon = Photon::new(position(i as u32), Vec3::Z, Vec3::Z, Rgb::ONE);
@@ -141,10 +142,8 @@ fn finds_all(map: &PhotonMap, level: Level, centre: Vec3, radius: f32) -> bool {
 
 fn finds_nearest(map: &PhotonMap, level: Level, centre: Vec3, radius: f32) -> bool {
     const K: usize = 50;
-    let mut lines = vec![Line([0; 64]); Neighbours::footprint(K).bytes().div_ceil(64)];
-    let Ok(mut neighbours) = Neighbours::new(K, &mut Arena::over(&mut lines)) else {
-        return false;
-    };
+    let Ok(mut memory) = lines(Neighbours::footprint(K)) else { return false };
+    let Ok(mut neighbours) = Neighbours::new(K, &mut Arena::over(&mut memory)) else { return false };
     map.nearest(level, centre, radius, &mut neighbours);
     let mut found: Vec<u32> = neighbours.iter().map(|(index, _)| index).collect();
     let mut all: Vec<(u32, f32)> = brute::within(map, centre, radius).collect();

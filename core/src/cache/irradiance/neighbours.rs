@@ -42,7 +42,7 @@ impl Neighbours<'_, '_> {
         let mut count = 0;
         let (records, least_cos) = (&*self.records, self.least_cos);
         // Curvatures of the errors of the new record and of the other.
-        let mut note = |index: u32, curvatures: [f32; 2]| {
+        let mut add = |index: u32, curvatures: [f32; 2]| {
             if curvatures != [0.0; 2]
                 && let Some(slot) = found.get_mut(count)
             {
@@ -54,11 +54,11 @@ impl Neighbours<'_, '_> {
         let this = *new;
         self.tree.at(position, |index| {
             let other = records.get(index as usize);
-            note(index, [0.0, other.map_or(0.0, |other| other.contradiction(&this, least_cos))])
+            add(index, [0.0, other.map_or(0.0, |other| other.contradiction(&this, least_cos))])
         });
         self.tree.around(position, new.extent().max_element(), |index| {
             let other = records.get(index as usize);
-            note(index, [other.map_or(0.0, |other| this.contradiction(other, least_cos)), 0.0]);
+            add(index, [other.map_or(0.0, |other| this.contradiction(other, least_cos)), 0.0]);
         });
         for &(index, [of_new, of_other]) in found.iter().take(count) {
             let radius = radius(new.allowed, of_new.max(of_other));
@@ -115,19 +115,19 @@ impl Record {
     /// Curvature, relative to the irradiance, that explains the error of this record at the position of
     /// `other`. Zero without error, or if noise or the radii of both explain it.
     fn contradiction(&self, other: &Record, least_cos: f32) -> f32 {
-        let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
+        let (position, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
         // The boundary of `other` reflects a close overhang.
-        let point = QueryPoint { position: place, normal, within: other.farthest() };
-        let Some((said, _)) = self.at(&point, least_cos) else { return 0.0 };
+        let point = QueryPoint { position, normal, within: other.farthest() };
+        let Some((extrapolated, _)) = self.at(&point, least_cos) else { return 0.0 };
         let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));
-        let square = place.distance_squared(self.position.into());
+        let square = position.distance_squared(self.position.into());
         // The gradient is noisy as well.
         let noise = there * there * other.noise
             + here
                 * here
                 * self.noise
                 * (1.0 + GRADIENT_VARIANCE * self.mean_square_inverse_distance * square);
-        let excess = (there - luminance(said)).abs() - NOISE_DEVIATIONS * libm::sqrtf(noise);
+        let excess = (there - luminance(extrapolated)).abs() - NOISE_DEVIATIONS * libm::sqrtf(noise);
         let curvature = 2.0 * excess / (square * here.max(there));
         let shrinks = radius(self.allowed, curvature) < self.radii[0].max(other.radii[0]);
         if excess > 0.0 && shrinks { curvature } else { 0.0 }

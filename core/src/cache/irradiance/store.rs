@@ -162,8 +162,8 @@ impl<'m> IrradianceCache<'m> {
         let mut covered = false;
         self.tree.at(point.position, |index| {
             let record = self.records.get(index as usize);
-            let is_heard = |record: &Record| point.within < f32::INFINITY || record.exposed(point) == 0.0;
-            covered = record.is_some_and(|record| record.covers(point, self.least_cos) && is_heard(record));
+            let is_certain = |record: &Record| point.within < f32::INFINITY || record.exposed(point) == 0.0;
+            covered = record.is_some_and(|record| record.covers(point, self.least_cos) && is_certain(record));
             !covered
         });
         covered

@@ -1,4 +1,4 @@
-//! The emission of caustic photons as a prepass has learned it, and the tracer of a map by it.
+//! Emission of caustic photons that a prepass has learned, and the photon tracer that samples it.
 
 use super::benefit::Benefit;
 use crate::bsdf::Features;
@@ -12,31 +12,31 @@ use crate::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettin
 /// Radius of the discs of the first sample, in pixels, with the usual photon budget.
 pub(super) const FIRST_RADIUS: f64 = 1.0;
 
-/// Conditions of a prepass.
+/// Settings of the prepass of caustic photons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CausticSettings {
-    /// Whether an irradiance cache has the light that rough surfaces reflect.
+    /// True if an irradiance cache supplies the light that rough surfaces reflect.
     pub beside_records: bool,
-    /// Bytes that photons leave for others.
+    /// Bytes that photon maps leave to other structures.
     pub reserved: usize,
 }
 
-/// How caustic photons are emitted and gathered.
+/// Emission and density estimation of caustic photons.
 #[derive(Clone, Copy)]
 pub struct CausticEmission<'a> {
     pub(super) sampler: EmissionSampler<'a>,
-    /// Radii of one pixel.
+    /// Kernel radii of one pixel.
     pub(super) radii: RadiusSchedule,
     pub(super) benefit: Benefit,
 }
 
-/// Memory for the fewest photons.
+/// Footprint of the two smallest photon maps.
 pub fn least_footprint() -> Footprint {
     let map = PhotonMapStore::footprint(PHOTONS_PER_TASK);
     map.and(map)
 }
 
-/// A tracer of `paths` light paths by `sampler`, for discs of `radii`.
+/// Photon tracer of `paths` light paths, which `sampler` emits, for kernels of `radii`.
 pub(super) fn photon_tracer<'a, F: Features>(
     context: &RenderContext<'a>,
     sampler: &'a EmissionSampler<'a>,

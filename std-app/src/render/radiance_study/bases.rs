@@ -2,11 +2,12 @@
 
 use super::Random;
 use super::rooms::Room;
+use crate::memory::lines;
 use glam::Vec3;
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, Conductor};
 use halflight_core::cache::radiance::{sh, zernike};
-use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::memory::{Arena, OutOfMemory};
 use halflight_core::sampling::warp::cosine_hemisphere;
 
 /// GGX alphas of the lobes.
@@ -102,7 +103,7 @@ pub(super) fn errors() -> Result<Vec<BasisError>, OutOfMemory> {
             }
         }
     }
-    let mut lines = vec![Line([0; 64]); sh::ShTables::footprint(STRATA, sh::ORDER_MAX).bytes() / 64];
+    let mut lines = lines(sh::ShTables::footprint(STRATA, sh::ORDER_MAX))?;
     let tables = sh::ShTables::build(STRATA, sh::ORDER_MAX, &mut Arena::over(&mut lines))?;
     let per_stratum = tables.integrals().len() / (STRATA * STRATA);
 

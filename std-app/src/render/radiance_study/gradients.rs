@@ -3,6 +3,7 @@
 
 use super::Random;
 use super::polygons::{add_coefficients, behind, distance, normal};
+use crate::memory::lines;
 use glam::{DVec2, DVec3, Vec2, Vec3Swizzles};
 use halflight_core::Level;
 use halflight_core::cache::irradiance::Hemisphere;
@@ -10,7 +11,7 @@ use halflight_core::cache::radiance::StrataTables;
 use halflight_core::cache::radiance::derivatives::{Gradients, border_flux, displaced, unoccluded};
 use halflight_core::cache::radiance::lobes::LobeTable;
 use halflight_core::cache::radiance::zernike::{COUNT_MAX, count};
-use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::memory::{Arena, OutOfMemory};
 use halflight_core::sampling::warp::cosine_hemisphere;
 
 /// Unit room seen from its floor.
@@ -208,10 +209,10 @@ fn lobes(table: &LobeTable) -> Vec<[f32; COUNT_MAX]> {
 
 /// Errors in one room with `strata` strata along a side.
 pub(super) fn errors(room: &Room, strata: usize) -> Result<GradientError, OutOfMemory> {
-    let mut lines = vec![Line([0; 64]); StrataTables::footprint(strata, DEGREE).bytes() / 64];
-    let tables = StrataTables::build(strata, DEGREE, &mut Arena::over(&mut lines))?;
-    let mut lines = vec![Line([0; 64]); LobeTable::footprint().bytes() / 64];
-    let lobes = lobes(&LobeTable::build(&mut Arena::over(&mut lines))?);
+    let mut memory = lines(StrataTables::footprint(strata, DEGREE))?;
+    let tables = StrataTables::build(strata, DEGREE, &mut Arena::over(&mut memory))?;
+    let mut memory = lines(LobeTable::footprint())?;
+    let lobes = lobes(&LobeTable::build(&mut Arena::over(&mut memory))?);
     let mut random = Random(17);
     let (mut gradient, mut hessian, mut leaving) = <([Squares; 4], [Squares; 4], [Squares; 3])>::default();
     for _ in 0..RECEIVERS {
