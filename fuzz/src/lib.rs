@@ -26,6 +26,7 @@ mod rooms;
 pub mod sampling;
 #[cfg(feature = "app")]
 pub mod scene_file;
+pub mod shading;
 pub mod splats;
 
 /// A fuzz target: name and function.
@@ -60,5 +61,6 @@ pub const TARGETS: &[Target] = &[
     Target { name: "sampling", run: sampling::run },
     #[cfg(feature = "app")]
     Target { name: "scene_file", run: scene_file::run },
+    Target { name: "shading", run: shading::run },
     Target { name: "splats", run: splats::run },
 ];

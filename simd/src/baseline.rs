@@ -66,6 +66,10 @@ impl Lanes for F8 {
     const N: usize = 8;
 
     #[inline(always)]
+    fn all(self, value: f32) -> Self {
+        Self(f32x8::splat(value))
+    }
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self(self.0.fast_min(other.0))
     }
@@ -76,6 +80,11 @@ impl Lanes for F8 {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.abs())
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        let minus = f32x8::splat(-0.0);
+        Self((self.0 & !minus) | (sign.0 & minus))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
@@ -170,6 +179,10 @@ impl<L: Lanes<Array = [f32; 8]>> Lanes for Pair<L> {
     const N: usize = 16;
 
     #[inline(always)]
+    fn all(self, value: f32) -> Self {
+        Self(self.0.all(value), self.1.all(value))
+    }
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self(self.0.min(other.0), self.1.min(other.1))
     }
@@ -180,6 +193,10 @@ impl<L: Lanes<Array = [f32; 8]>> Lanes for Pair<L> {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        Self(self.0.copysign(sign.0), self.1.copysign(sign.1))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

@@ -31,12 +31,16 @@ pub trait Lanes:
     /// Number of lanes.
     const N: usize;
 
+    /// `value` in all lanes of the same level.
+    fn all(self, value: f32) -> Self;
     /// Smaller value of each lane; either if one is NaN.
     fn min(self, other: Self) -> Self;
     /// Larger value of each lane; either if one is NaN.
     fn max(self, other: Self) -> Self;
     /// Magnitude of each lane.
     fn abs(self) -> Self;
+    /// Magnitude of each lane with the sign of `sign`, zeros and NaN included.
+    fn copysign(self, sign: Self) -> Self;
     /// Correctly rounded square root of each lane.
     fn sqrt(self) -> Self;
     /// Largest power of two not above the magnitude of each lane; zero for denormals.
@@ -84,16 +88,25 @@ impl Lanes for f32 {
     const N: usize = 1;
 
     #[inline(always)]
+    fn all(self, value: f32) -> Self {
+        value
+    }
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
-        f32::min(self, other)
+        // The second value if either is NaN, as the instructions of x86 do.
+        if self < other { self } else { other }
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        f32::max(self, other)
+        if self > other { self } else { other }
     }
     #[inline(always)]
     fn abs(self) -> Self {
         f32::abs(self)
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        f32::copysign(self, sign)
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

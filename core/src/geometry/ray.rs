@@ -20,16 +20,19 @@ pub struct Ray {
 
 impl Ray {
     /// Unbounded ray.
+    #[inline]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self::segment(origin, direction, f32::INFINITY)
     }
 
     /// Ray that ends at `t_max`.
+    #[inline]
     pub fn segment(origin: Vec3, direction: Vec3, t_max: f32) -> Self {
         Self { origin: origin.to_array(), t_max, direction: direction.to_array(), tag: 0 }
     }
 
     /// Point at `t`.
+    #[inline]
     pub fn at(&self, t: f32) -> Vec3 {
         Vec3::from(self.origin) + t * Vec3::from(self.direction)
     }
@@ -66,6 +69,7 @@ impl Hit {
     }
 
     /// True if a triangle was hit.
+    #[inline]
     pub fn is_some(&self) -> bool {
         self.triangle != MISS
     }

@@ -14,6 +14,7 @@ use crate::sampling::{AliasTable, ONE_MINUS_EPSILON};
 use crate::scene::{Mesh, PointLight, Scene};
 use crate::{Level, Rgb};
 use glam::Vec3;
+use halflight_simd::kernels::shade::emitter::EmitterBlock;
 
 /// Least probability of each kind of light that exists.
 const MIN_PROBABILITY: f32 = 0.1;
@@ -40,6 +41,7 @@ pub struct LightSample {
 }
 
 impl LightSample {
+    #[inline]
     fn far(direction: Vec3, radiance: Rgb, pdf: f32, light: u32) -> Self {
         Self { direction, distance: f32::INFINITY, target: None, radiance, pdf, delta: false, light }
     }
@@ -76,6 +78,34 @@ pub struct LightSampler<'m> {
     pub(super) distant_weight: f32,
 }
 
+/// Light that [`LightSampler::choose`] chose, with the probability of the choice.
+#[derive(Clone, Copy)]
+pub(crate) enum ChosenLight<'m> {
+    /// Area light number `light`.
+    Emitter { emitter: &'m Emitter, light: u32, probability: f32 },
+    /// Point or spot number `light`.
+    Point { light: u32, probability: f32 },
+    /// The environment.
+    Environment { probability: f32 },
+    /// Directional light number `index`.
+    Distant { index: usize, probability: f32 },
+}
+
+impl ChosenLight<'_> {
+    /// Makes an area light without texture the light of vertex `i` (below 16) of a block. Returns its first
+    /// triangle and the probability of the choice; `None` for other lights.
+    #[inline]
+    pub(crate) fn put(&self, block: &mut EmitterBlock, i: usize) -> Option<(u32, f32)> {
+        match *self {
+            Self::Emitter { emitter, probability, .. } if !emitter.is_textured() => {
+                emitter.put(block, i);
+                Some((emitter.triangle, probability))
+            }
+            _ => None,
+        }
+    }
+}
+
 /// Probability of each kind of light.
 struct KindProbabilities {
     tree: f32,
@@ -106,6 +136,7 @@ impl<'m> LightSampler<'m> {
     }
 
     /// True if the environment is sampled by its visibility.
+    #[inline]
     pub fn has_visibility(&self) -> bool {
         self.visibility.is_some()
     }
@@ -123,6 +154,7 @@ impl<'m> LightSampler<'m> {
     }
 
     /// True without lights.
+    #[inline]
     pub fn is_empty(&self) -> bool {
         self.in_tree() == 0 && self.environment.is_none() && self.distant.is_empty()
     }
@@ -150,38 +182,72 @@ impl<'m> LightSampler<'m> {
         u: [f32; 3],
         warped: Option<WarpedSample>,
     ) -> Option<(LightSample, bool)> {
-        let shares = self.kind_probabilities(position, normal);
         let [u0, u1, choice] = u;
+        let chosen = self.choose(position, normal, choice)?;
+        self.sample_chosen(scene, position, normal, [u0, u1], chosen, warped)
+    }
+
+    /// Chooses the light of a sample by the number `choice`.
+    #[inline]
+    pub(crate) fn choose(&self, position: Vec3, normal: Vec3, choice: f32) -> Option<ChosenLight<'m>> {
+        let shares = self.kind_probabilities(position, normal);
         if choice < shares.tree {
             let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
             let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;
             let probability = probability * shares.tree;
-            let sample = match self.emitters.get(light as usize) {
-                Some(emitter) => sample_emitter(scene, emitter, position, normal, [u0, u1], probability),
-                None => self.sample_point(scene, light, position, probability),
-            };
-            return Some((LightSample { light, ..sample? }, false));
+            return Some(match self.emitters.get(light as usize) {
+                Some(emitter) => ChosenLight::Emitter { emitter, light, probability },
+                None => ChosenLight::Point { light, probability },
+            });
         }
         let choice = choice - shares.tree;
         if choice < shares.environment {
-            let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
-            let (direction, pdf) = match warped {
-                Some(warped) => sampler.sample_at(environment, warped)?,
-                None => sampler.sample(environment, normal, [u0, u1])?,
-            };
-            let pdf = pdf * shares.environment;
-            let light = (self.in_tree() + self.distant.len()) as u32;
-            return Some((LightSample::far(direction, Rgb::ONE, pdf, light), true));
+            return Some(ChosenLight::Environment { probability: shares.environment });
         }
         let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
         let (index, probability, _) = self.distant_table.sample(choice)?;
-        match scene.lights.get(*self.distant.get(index)? as usize)? {
-            PointLight::Directional { direction, irradiance } => {
-                let (pdf, light) = (probability * shares.distant, (self.in_tree() + index) as u32);
-                let sample = LightSample::far(-*direction, *irradiance, pdf, light);
-                Some((LightSample { delta: true, ..sample }, false))
+        Some(ChosenLight::Distant { index, probability: probability * shares.distant })
+    }
+
+    /// [`LightSampler::sample_deferred`] of a chosen light.
+    #[inline]
+    pub(crate) fn sample_chosen(
+        &self,
+        scene: &Scene,
+        position: Vec3,
+        normal: Vec3,
+        u: [f32; 2],
+        chosen: ChosenLight,
+        warped: Option<WarpedSample>,
+    ) -> Option<(LightSample, bool)> {
+        match chosen {
+            ChosenLight::Emitter { emitter, light, probability } => {
+                let sample = sample_emitter(scene, emitter, position, normal, u, probability)?;
+                Some((LightSample { light, ..sample }, false))
             }
-            _ => None,
+            ChosenLight::Point { light, probability } => {
+                let sample = self.sample_point(scene, light, position, probability)?;
+                Some((LightSample { light, ..sample }, false))
+            }
+            ChosenLight::Environment { probability } => {
+                let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
+                let (direction, pdf) = match warped {
+                    Some(warped) => sampler.sample_at(environment, warped)?,
+                    None => sampler.sample(environment, normal, u)?,
+                };
+                let light = (self.in_tree() + self.distant.len()) as u32;
+                Some((LightSample::far(direction, Rgb::ONE, pdf * probability, light), true))
+            }
+            ChosenLight::Distant { index, probability } => {
+                let light = (self.in_tree() + index) as u32;
+                match scene.lights.get(*self.distant.get(index)? as usize)? {
+                    PointLight::Directional { direction, irradiance } => {
+                        let sample = LightSample::far(-*direction, *irradiance, probability, light);
+                        Some((LightSample { delta: true, ..sample }, false))
+                    }
+                    _ => None,
+                }
+            }
         }
     }
 
@@ -302,15 +368,18 @@ impl<'m> LightSampler<'m> {
     }
 
     /// Number of lights of all kinds, in the order of emission.
+    #[inline]
     pub(super) fn count(&self) -> usize {
         self.finite_count() + self.distant.len() + usize::from(self.environment.is_some())
     }
 
     /// Number of lights at finite places.
+    #[inline]
     pub(super) fn finite_count(&self) -> usize {
         self.in_tree()
     }
 
+    #[inline]
     fn in_tree(&self) -> usize {
         self.emitters.len() + self.points.len()
     }

@@ -1,15 +1,6 @@
 //! Counter-based random numbers: hashes without state between calls.
 
-use super::unit_float;
-
-/// Bijective mix of 64 bits in which every input bit affects every output bit (the finaliser of SplitMix64,
-/// Stafford's variant 13).
-#[inline]
-pub const fn mix(mut x: u64) -> u64 {
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
+use super::{GOLDEN, mix, unit_float};
 
 /// Independent random numbers for decisions outside the Sobol' streams. Counter `n` of a key always gives the
 /// same number.
@@ -43,6 +34,3 @@ impl Random {
         unit_float(self.bits(counter))
     }
 }
-
-/// 2^64 over the golden ratio, odd, so that consecutive multiples are far apart.
-pub(super) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;

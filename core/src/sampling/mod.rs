@@ -12,17 +12,14 @@ pub mod warp;
 
 pub use alias::{AliasEntry, AliasTable};
 pub use distribution::{Cell, Distribution2d};
-pub use hash::{Random, mix};
+pub use halflight_simd::kernels::shade::numbers::{mix, unit_float};
+pub use hash::Random;
 pub use numbers::Numbers;
 pub use primary_sample::Mutation;
 pub use sobol::Sampler;
 pub use trigonometry::sin_cos_turns;
 
-/// Float in [0, 1) from a 32-bit fraction: the upper 24 bits, so that 1 is never reached.
-#[inline]
-pub const fn unit_float(bits: u32) -> f32 {
-    (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
-}
+use halflight_simd::kernels::shade::numbers::GOLDEN;
 
 /// Largest float below 1.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;

@@ -21,8 +21,8 @@
 //!
 //! Everything before the last conversion is integer arithmetic: the same bits on every machine.
 
-use super::hash::{GOLDEN, mix};
-use super::unit_float;
+use super::{GOLDEN, mix, unit_float};
+use halflight_simd::kernels::shade::numbers::{self, SECOND_PAIR, owen, pascal, second_key};
 
 /// Random numbers of one sample of one pixel, by dimension. A dimension always gives the same numbers, and
 /// different dimensions are independent. Up to 2^32 samples of pixels below 2^31.
@@ -52,33 +52,28 @@ impl Sampler {
     #[inline]
     pub const fn replicate(seed: u32, pixel: u32, replicate: u32, index: u32) -> Self {
         let place = (seed as u64) << 32 | (pixel ^ replicate << 31) as u64;
-        Self { key: mix(place.wrapping_add(GOLDEN)), reversed_index: index.reverse_bits() }
+        Self { key: numbers::place_key(place), reversed_index: index.reverse_bits() }
     }
 
     /// Number in [0, 1). Every power-of-two prefix of a replicate has one number in each of its equal
     /// intervals.
     #[inline]
     pub fn single(&self, dimension: u32) -> f32 {
-        let keys = self.keys(dimension);
-        unit_float(owen(self.shuffled_index(keys), (keys >> 32) as u32))
+        numbers::single(self.key, self.reversed_index, dimension)
     }
 
     /// Point of [0, 1)². Every power-of-two prefix of a replicate is a (0,2)-net.
     #[inline]
     pub fn pair(&self, dimension: u32) -> [f32; 2] {
-        let keys = self.keys(dimension);
-        let index = self.shuffled_index(keys);
-        let x = owen(index, (keys >> 32) as u32);
-        let y = owen(pascal(index), second_key(keys));
-        [unit_float(x), unit_float(y)]
+        numbers::pair(self.key, self.reversed_index, dimension)
     }
 
     /// Point of [0, 1)⁴. Both halves are (0,2)-sequences over a replicate, and all four numbers together fill
     /// space more evenly than two independent pairs.
     #[inline]
     pub fn quad(&self, dimension: u32) -> [f32; 4] {
-        let keys = self.keys(dimension);
-        let index = self.shuffled_index(keys);
+        let keys = numbers::keys(self.key, dimension);
+        let index = owen(self.reversed_index, keys as u32);
         let other = second_pair(index);
         let more = mix(keys.wrapping_add(GOLDEN));
         [
@@ -89,88 +84,12 @@ impl Sampler {
         ]
     }
 
-    /// 64 hashed bits for a dimension: the lower half shuffles, the upper half scrambles.
+    /// Seed and pixel of sample number `sample`, and its index, for [`numbers::SampleBlock`].
     #[inline]
-    const fn keys(&self, dimension: u32) -> u64 {
-        mix(self.key.wrapping_add((dimension as u64).wrapping_mul(GOLDEN)))
-    }
-
-    #[inline]
-    const fn shuffled_index(&self, keys: u64) -> u32 {
-        owen(self.reversed_index, keys as u32)
+    pub(crate) const fn place(seed: u32, pixel: u32, sample: u32) -> (u64, u32) {
+        ((seed as u64) << 32 | (pixel ^ (sample & 1) << 31) as u64, sample >> 1)
     }
 }
-
-/// Owen-scrambles a number given with its bits reversed, and reverses them.
-#[inline]
-const fn owen(reversed: u32, key: u32) -> u32 {
-    laine_karras(reversed, key).reverse_bits()
-}
-
-/// Hash in which a bit depends on itself and lower bits only: on reversed bits, an Owen scramble.
-#[inline]
-const fn laine_karras(mut x: u32, key: u32) -> u32 {
-    x ^= x.wrapping_mul(0x3d20_adea);
-    x = x.wrapping_add(key);
-    x = x.wrapping_mul((key >> 16) | 1);
-    x ^= x.wrapping_mul(0x0552_6c56);
-    x ^ x.wrapping_mul(0x53a2_2864)
-}
-
-/// Key of the second coordinate, from bits of both halves.
-#[inline]
-const fn second_key(keys: u64) -> u32 {
-    (keys.wrapping_mul(0xd6e8_feb8_6659_fd93) >> 32) as u32
-}
-
-/// Product of the Pascal matrix mod 2 with `index`: Sobol' dimension 1 with its bits reversed.
-#[inline]
-const fn pascal(mut index: u32) -> u32 {
-    index ^= index >> 16;
-    index ^= (index >> 8) & 0x00ff_00ff;
-    index ^= (index >> 4) & 0x0f0f_0f0f;
-    index ^= (index >> 2) & 0x3333_3333;
-    index ^ ((index >> 1) & 0x5555_5555)
-}
-
-/// Columns of the upper unitriangular matrix that maps the index of the first pair of a quad to that of the
-/// second. The map permutes every aligned power-of-two block within itself, so that the second pair is a
-/// (0,2)-sequence like the first. The columns were found by a beam search, block size by block size, for
-/// small t of all projections that mix both pairs. Those after the fifteenth are random.
-const SECOND_PAIR: [u32; 32] = [
-    0x0000_0001,
-    0x0000_0002,
-    0x0000_0005,
-    0x0000_000b,
-    0x0000_0010,
-    0x0000_0021,
-    0x0000_0043,
-    0x0000_00ec,
-    0x0000_017c,
-    0x0000_0259,
-    0x0000_047e,
-    0x0000_0ef7,
-    0x0000_159f,
-    0x0000_2f63,
-    0x0000_7721,
-    0x0000_a7db,
-    0x0001_37a0,
-    0x0003_2544,
-    0x0006_63d9,
-    0x000b_bcb2,
-    0x0019_7b6d,
-    0x003b_15a7,
-    0x0047_28d9,
-    0x00a5_cba9,
-    0x010e_ddd7,
-    0x0385_fea5,
-    0x046b_5de9,
-    0x0a04_e12a,
-    0x11d2_c113,
-    0x20f2_90ec,
-    0x5bd2_c7de,
-    0xa82b_3d3a,
-];
 
 /// Sum of the columns for each value of each nibble of an index.
 static SECOND_PAIR_SUMS: [[u32; 16]; 8] = {

@@ -1,9 +1,11 @@
 //! Perspective camera: pinhole or thin lens. Raster coordinates are continuous, x to the right and y down;
 //! the centre of the first pixel is (0.5, 0.5).
 
+use crate::Level;
 use crate::geometry::Ray;
 use crate::sampling::warp::concentric_disk;
 use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::camera::CameraRays;
 
 /// Perspective camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,6 +98,28 @@ impl Camera {
             return Ray::new(start(p), focus.normalize());
         }
         Ray::new(if self.start.is_some() { start(Vec2::ZERO) } else { self.eye }, through.normalize())
+    }
+
+    /// [`Camera::ray`] through sixteen points of the picture, by columns and rows; `None` unless the camera is
+    /// a pinhole at `eye`.
+    #[inline]
+    pub(crate) fn rays(
+        &self,
+        level: Level,
+        [width, height]: [u32; 2],
+        raster: &[[f32; 16]; 2],
+    ) -> Option<[Ray; 16]> {
+        if self.lens_radius > 0.0 || self.start.is_some() {
+            return None;
+        }
+        let rays = CameraRays {
+            eye: self.eye.to_array(),
+            axes: [self.right.to_array(), self.up.to_array(), self.forward.to_array()],
+            pixel: 2.0 * self.tan_half_fov / height as f32,
+            half: [0.5 * width as f32, 0.5 * height as f32],
+            raster,
+        };
+        Some(bytemuck::cast(rays.compute(level)))
     }
 
     /// Inverse of [`Camera::ray`]: the projection of `point` through the point `lens` of the lens. `None`

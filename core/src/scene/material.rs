@@ -91,11 +91,13 @@ impl Material {
     }
 
     /// True if the material emits light.
+    #[inline]
     pub fn emits(&self) -> bool {
         self.emission.value.max_element() > 0.0
     }
 
     /// True if a ray may pass through by opacity.
+    #[inline]
     pub fn has_cutout(&self) -> bool {
         self.opacity.value < 1.0 || self.opacity.texture.is_some()
     }

@@ -1,10 +1,12 @@
 //! Surface interaction at a hit: position with an error bound, normals, texture coordinates, and rays that
-//! leave the surface without hitting it again.
+//! leave the surface without hitting it again. Blocks of them are computed in lanes, with the same bits
+//! (`halflight_simd::kernels::shade::surface`).
 
 use super::{Material, NormalMap, Scene};
 use crate::features::Features;
 use crate::geometry::{Frame, Hit, Ray};
 use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::surface::{ERROR_UNITS, MAX_SLENDERNESS, MIN_VIEW_COSINE, SAFE_SQUARES};
 
 /// Surface data for shading. Both normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug)]
@@ -27,20 +29,6 @@ pub struct SurfacePoint<'a> {
     /// Index of the triangle.
     pub triangle: u32,
 }
-
-/// Relative error bound, 16 half units in the last place: five roundings of the sum of three products, as
-/// many of the tracer's differences and shears, and one of the offset itself, rounded up.
-const ERROR_UNITS: f32 = 16.0 * 0.5 * f32::EPSILON;
-
-/// Upper limit of slenderness, so that needles do not move rays too far. The error of the tracer's distances
-/// grows with the length of a triangle times its slenderness.
-const MAX_SLENDERNESS: f32 = 16.0;
-
-/// Squares outside this range lose bits to underflow or overflow.
-const SAFE_SQUARES: core::ops::Range<f32> = 1e-24..1e24;
-
-/// Least cosine of the viewer over the horizon of the shading normal, which is turned to reach it.
-const MIN_VIEW_COSINE: f32 = 1e-3;
 
 impl<'a> SurfacePoint<'a> {
     /// Point of `hit`, seen along `ray`. `None` if the scene has no such triangle or material, or the

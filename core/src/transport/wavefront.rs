@@ -41,32 +41,33 @@ pub(in crate::transport) trait Shade {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PathState {
+    // The first twelve words are those that shading writes as records of lanes.
     /// β, the factor from radiance at the hit of the ray to radiance in the pixel.
     pub(in crate::transport) throughput: [f32; 3],
     /// Solid-angle pdf of the ray; infinite if no other technique can sample it.
     pub(in crate::transport) pdf: f32,
-    /// L, the radiance that the path has found so far.
-    pub(in crate::transport) radiance: [f32; 3],
-    /// Part of `radiance` that is blur of density estimates.
-    pub(in crate::transport) blur: [f32; 3],
-    /// Index of the pixel in the picture.
-    pub(in crate::transport) pixel: u32,
     /// Position of the last scattering vertex.
     pub(in crate::transport) position: [f32; 3],
+    /// Product of the squared relative indices of refraction so far.
+    pub(in crate::transport) eta_squared: f32,
+    /// Normal at `position` for light sampling.
+    pub(in crate::transport) normal: [f32; 3],
+    /// Triangle at the origin of the ray, which the ray cannot hit again.
+    pub(in crate::transport) triangle: u32,
+    /// L, the radiance that the path has found so far.
+    pub(in crate::transport) radiance: [f32; 3],
+    /// Index of the pixel in the picture.
+    pub(in crate::transport) pixel: u32,
+    /// Part of `radiance` that is blur of density estimates.
+    pub(in crate::transport) blur: [f32; 3],
     /// Index of the pixel in its tile.
     pub(in crate::transport) place: u32,
     /// Sample number of the pixel.
     pub(in crate::transport) sample: u32,
-    /// Normal at `position` for light sampling.
-    pub(in crate::transport) normal: [f32; 3],
     /// Segments traced, including the current one.
     pub(in crate::transport) segments: u16,
     /// Number of skipped surfaces.
     pub(in crate::transport) crossings: u16,
-    /// Triangle at the origin of the ray, which the ray cannot hit again.
-    pub(in crate::transport) triangle: u32,
-    /// Product of the squared relative indices of refraction so far.
-    pub(in crate::transport) eta_squared: f32,
     /// Classes of light that the path has to find behind its ray.
     pub(in crate::transport) classes: PathClasses,
     /// Length of the path from the camera to its last vertex.

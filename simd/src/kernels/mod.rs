@@ -12,6 +12,7 @@ pub mod outer;
 pub mod points;
 pub mod push;
 pub mod select;
+pub mod shade;
 pub mod triangles;
 
 /// Largest finite reciprocal of a direction, so that `0 * inf` never reaches a slab test.

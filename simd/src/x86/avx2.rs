@@ -80,6 +80,11 @@ impl Lanes for F8 {
     const N: usize = 8;
 
     #[inline(always)]
+    fn all(self, value: f32) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_min_ps(self.0, other.0) })
@@ -93,6 +98,14 @@ impl Lanes for F8 {
     fn abs(self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let minus = _mm256_set1_ps(-0.0);
+            Self(_mm256_or_ps(_mm256_andnot_ps(minus, self.0), _mm256_and_ps(minus, sign.0)))
+        }
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

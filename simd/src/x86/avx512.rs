@@ -22,7 +22,7 @@ macro_rules! lanes {
     ($lanes:ident, $mask:ident, $bits:ty, $n:literal, $register:ty,
      $add:ident $sub:ident $mul:ident $div:ident $xor:ident $and_not:ident $splat:ident
      $min:ident $max:ident $compare:ident $blend:ident $store:ident $largest:ident $smallest:ident
-     $signs:ident $bits_of:ident $sqrt:ident $and:ident $fused:ident) => {
+     $signs:ident $bits_of:ident $sqrt:ident $and:ident $or:ident $fused:ident) => {
         /// Lanes of a register.
         #[derive(Clone, Copy)]
         pub(crate) struct $lanes($register);
@@ -82,6 +82,11 @@ macro_rules! lanes {
             const N: usize = $n;
 
             #[inline(always)]
+            fn all(self, value: f32) -> Self {
+                // SAFETY: as above.
+                Self(unsafe { $splat(value) })
+            }
+            #[inline(always)]
             fn min(self, other: Self) -> Self {
                 // SAFETY: as above.
                 Self(unsafe { $min(self.0, other.0) })
@@ -95,6 +100,14 @@ macro_rules! lanes {
             fn abs(self) -> Self {
                 // SAFETY: as above.
                 Self(unsafe { $and_not($splat(-0.0), self.0) })
+            }
+            #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                // SAFETY: as above.
+                unsafe {
+                    let minus = $splat(-0.0);
+                    Self($or($and_not(minus, self.0), $and(minus, sign.0)))
+                }
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
@@ -195,11 +208,13 @@ unsafe fn smallest8(lanes: __m256) -> f32 {
 lanes!(F8, M8, __mmask8, 8, __m256,
     _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_xor_ps _mm256_andnot_ps _mm256_set1_ps
     _mm256_min_ps _mm256_max_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps _mm256_storeu_ps largest8 smallest8
-    _mm256_movepi32_mask _mm256_castps_si256 _mm256_sqrt_ps _mm256_and_ps _mm256_fmsub_ps);
+    _mm256_movepi32_mask _mm256_castps_si256 _mm256_sqrt_ps _mm256_and_ps _mm256_or_ps
+    _mm256_fmsub_ps);
 lanes!(F16, M16, __mmask16, 16, __m512,
     _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_xor_ps _mm512_andnot_ps _mm512_set1_ps
     _mm512_min_ps _mm512_max_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_storeu_ps _mm512_reduce_max_ps
-    _mm512_reduce_min_ps _mm512_movepi32_mask _mm512_castps_si512 _mm512_sqrt_ps _mm512_and_ps _mm512_fmsub_ps);
+    _mm512_reduce_min_ps _mm512_movepi32_mask _mm512_castps_si512 _mm512_sqrt_ps _mm512_and_ps _mm512_or_ps
+    _mm512_fmsub_ps);
 
 /// The four floats from `from` (0 or 4) on of the records `i`, `i + 4`, `i + 8` and `i + 12` (`i` below 4).
 ///

@@ -3,6 +3,7 @@
 pub mod eigen;
 pub mod knn;
 pub mod rays;
+pub mod shade;
 
 use core::fmt;
 use halflight_core::memory::OutOfMemory;

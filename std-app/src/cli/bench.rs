@@ -3,6 +3,7 @@
 mod eigen;
 mod knn;
 mod rays;
+mod shade;
 
 use super::failure::Failure;
 use super::stdio::print_result;
@@ -25,6 +26,7 @@ enum Kernel {
     Rays(Box<rays::Rays>),
     Eigen(eigen::Eigen),
     Knn(knn::Knn),
+    Shade(shade::Shade),
 }
 
 /// Flags of all benchmarks.
@@ -56,6 +58,7 @@ impl Bench {
             Kernel::Rays(rays) => rays.run(),
             Kernel::Eigen(eigen) => eigen.run(),
             Kernel::Knn(knn) => knn.run(),
+            Kernel::Shade(shade) => shade.run(),
         }
     }
 }

@@ -2,24 +2,18 @@
 //! are sampled by solid angle, far ones by area. The choice depends on the shaded point only, so that
 //! [`Emitter::pdf`] is the density of [`Emitter::sample`] for a point found in any other way.
 
-mod rectangle;
-mod triangle;
-
 use crate::geometry::Cone;
 use crate::sampling::warp::uniform_triangle;
 use crate::scene::Mesh;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use rectangle::SphericalRectangle;
-use triangle::SphericalTriangle;
+use halflight_simd::kernels::shade::emitter::{EmitterBlock, SLIVER};
+use halflight_simd::kernels::shade::rectangle::SphericalRectangle;
+use halflight_simd::kernels::shade::triangle::SphericalTriangle;
 
 /// A light whose radius is below this fraction of its distance is sampled by area. On the Cornell box the
 /// squared error of a sample grows by 5 %, and its time shrinks by a quarter.
 const FAR: f32 = 0.35;
-
-/// Solid angle in steradians below which single precision cannot invert it. A light may be near and still a
-/// sliver.
-const SLIVER: f32 = 1e-3;
 
 /// Largest deviation from a parallelogram and from a right angle, as a fraction of the edges: far below a
 /// visible error of the density, far above the rounding of coordinates.
@@ -36,7 +30,7 @@ enum Shape {
 /// Flat light of one or two triangles: `origin + a * edges[0] + b * edges[1]`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Emitter {
+pub(crate) struct Emitter {
     pub(super) origin: [f32; 3],
     pub(super) edges: [[f32; 3]; 2],
     /// Unit normal of the emitting side.
@@ -143,14 +137,17 @@ impl Emitter {
         if self.is_two_sided() { Cone::ALL } else { Cone { axis: self.normal, cos: 1.0 } }
     }
 
+    #[inline]
     pub(super) fn is_pair(&self) -> bool {
         self.shape() != Shape::Triangle
     }
 
+    #[inline]
     pub(super) fn is_two_sided(&self) -> bool {
         self.flags & 1 << 6 != 0
     }
 
+    #[inline]
     pub(super) fn is_textured(&self) -> bool {
         self.flags & 1 << 7 != 0
     }
@@ -178,14 +175,32 @@ impl Emitter {
     }
 
     #[inline]
-    fn seen_rectangle(&self, from: Vec3) -> Option<SphericalRectangle> {
-        let edges = self.edges.map(Vec3::from);
-        SphericalRectangle::new(Vec3::from(self.origin), edges, self.normal.into(), from)
+    fn seen_rectangle(&self, from: Vec3) -> Option<SphericalRectangle<f32>> {
+        let seen = SphericalRectangle::new(self.origin, self.edges, self.normal, from.to_array());
+        seen.exists.then_some(seen)
     }
 
     #[inline]
-    fn seen_triangle(&self, from: Vec3) -> Option<SphericalTriangle> {
-        SphericalTriangle::new(Vec3::from(self.origin), self.edges.map(Vec3::from), from)
+    fn seen_triangle(&self, from: Vec3) -> Option<SphericalTriangle<f32>> {
+        let seen = SphericalTriangle::new(self.origin, self.edges, from.to_array());
+        seen.exists.then_some(seen)
+    }
+
+    /// Makes this the light of vertex `i` (below 16) of a block.
+    #[inline]
+    pub(super) fn put(&self, block: &mut EmitterBlock, i: usize) {
+        let i = i & 15;
+        for k in 0..3 {
+            block.origin[k][i] = self.origin[k];
+            block.edges[0][k][i] = self.edges[0][k];
+            block.edges[1][k][i] = self.edges[1][k];
+            block.normal[k][i] = self.normal[k];
+        }
+        (block.area[i], block.near[i]) = (self.area, self.near);
+        let shape = self.shape();
+        block.triangles |= u32::from(shape == Shape::Triangle) << i;
+        block.rectangles |= u32::from(shape == Shape::Rectangle) << i;
+        block.two_sided |= u32::from(self.is_two_sided()) << i;
     }
 
     /// Samples a point of the light as seen from `from`, with its density in solid angle; `None` in place of

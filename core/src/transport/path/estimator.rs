@@ -123,6 +123,8 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
     type State: Pod;
     /// Result of the lookup for a vertex.
     type Found: Copy + Default;
+    /// True if the estimator adds nothing, so that vertices are shaded in lanes.
+    const ADDS_NOTHING: bool = false;
     /// Maximum number of light samples per vertex.
     #[inline]
     fn light_samples(&self, _context: &SceneContext<F>) -> u32 {
@@ -232,6 +234,7 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
 impl<F: Features> LightEstimator<F> for () {
     type State = ();
     type Found = ();
+    const ADDS_NOTHING: bool = true;
 }
 
 /// Pair of estimators, the first of them stateless: a cache, and merging beside it.

@@ -17,6 +17,7 @@
 //! the pixels of its circle, no wave cuts a circle, and samples are summed in order: the picture has the same
 //! bits for any wave size and any distribution of tasks.
 
+mod block;
 mod connection;
 mod direct;
 pub(in crate::transport) mod estimator;
@@ -45,9 +46,11 @@ use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::path_classes::PathClasses;
-use crate::transport::wavefront::PathState;
+use crate::transport::wavefront::{BLOCK, PathState, Wavefront};
 use crate::{Level, Rgb};
+use block::Block;
 use core::ops::Range;
+use halflight_simd::kernels::shade::numbers::SampleBlock;
 use shade::Shading;
 use sharing::PathWave;
 use silhouette::silhouette_pixels;
@@ -201,6 +204,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                     self.begin(sampler, (place, sample), number, wave, &mut count);
                 }
             }
+            self.aim(&mut wave.wave, count);
             return count;
         }
         while count < capacity
@@ -208,6 +212,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         {
             self.begin(sampler, (place, sample), 0, wave, &mut count);
         }
+        self.aim(&mut wave.wave, count);
         count
     }
 
@@ -233,6 +238,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     }
 
     /// Starts path `index` of the wave: a sample of the pixel in column `x` and row `y`, stored at `place`.
+    /// Its ray starts at the pixel until [`Self::aim`].
     #[inline]
     fn begin_path(
         &self,
@@ -242,13 +248,44 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         is_on_silhouette: bool,
         circle: u32,
     ) {
-        let PathSettings { width, seed, .. } = self.settings;
-        let pixel = y * width + x;
-        let ray = self.camera_ray([x, y], &Sampler::new(seed, pixel, sample));
+        let pixel = y * self.settings.width + x;
         let classes = if is_on_silhouette { PathClasses::WITHOUT_EMISSION } else { PathClasses::ALL };
-        wave.wave.rays[index] = Ray { tag: index as u32, ..ray };
+        wave.wave.rays[index].origin = [x as f32, y as f32, 0.0];
         wave.wave.paths[index] = PathState::new(pixel, place, sample, classes);
         wave.begin(index, circle);
+    }
+
+    /// Replaces the pixels of the first `count` paths by their camera rays, sixteen at a time.
+    pub(in crate::transport) fn aim(&self, wave: &mut Wavefront, count: usize) {
+        let PathSettings { width, height, seed, .. } = self.settings;
+        let (level, camera) = (self.context.level, &self.context.scene.camera);
+        let mut samples = SampleBlock::EMPTY;
+        let mut raster = [[0.0; BLOCK]; 2];
+        for start in (0..count).step_by(BLOCK) {
+            let end = count.min(start + BLOCK);
+            for (i, path) in wave.paths[start..end].iter().enumerate() {
+                (samples.place[i & 15], samples.index[i & 15]) =
+                    Sampler::place(seed, path.pixel, path.sample);
+            }
+            let [dx, dy] = samples.pairs(level, dimension::PIXEL);
+            let rays = &mut wave.rays[start..end];
+            for (i, ray) in rays.iter().enumerate() {
+                let [x, y, _] = ray.origin;
+                (raster[0][i & 15], raster[1][i & 15]) = (x + dx[i & 15], y + dy[i & 15]);
+            }
+            if let Some(aimed) = camera.rays(level, [width, height], &raster) {
+                for (i, (ray, aimed)) in rays.iter_mut().zip(aimed).enumerate() {
+                    *ray = Ray { tag: (start + i) as u32, ..aimed };
+                }
+                continue;
+            }
+            for (i, (ray, path)) in rays.iter_mut().zip(&wave.paths[start..end]).enumerate() {
+                let sampler = Sampler::new(seed, path.pixel, path.sample);
+                let lens = if camera.lens_radius > 0.0 { sampler.pair(dimension::LENS) } else { [0.0; 2] };
+                let aimed = camera.ray(width, height, raster[0][i & 15], raster[1][i & 15], lens);
+                *ray = Ray { tag: (start + i) as u32, ..aimed };
+            }
+        }
     }
 
     /// Camera ray of a sample of the pixel in column `x` and row `y`.
@@ -279,6 +316,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         count: usize,
         counters: &mut Counters,
     ) {
-        wave.follow(&self.context, count, &mut Shading { integrator: self, memory }, counters);
+        let mut shading = Shading { integrator: self, memory, block: Block::new() };
+        wave.follow(&self.context, count, &mut shading, counters);
     }
 }

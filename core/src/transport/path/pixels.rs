@@ -46,6 +46,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
                 self.begin_path(&mut wave, count, (pixel, place, sample), on_silhouette(place), 0);
                 count += 1;
             }
+            self.aim(&mut wave.wave, count);
             counters.paths += count as u64;
             self.advance(&mut wave, count, &mut counters);
             self.trace_silhouettes(on_silhouette, &mut wave.wave, count, &mut counters);

@@ -3,6 +3,7 @@
 //! roulette.
 
 use super::PathIntegrator;
+use super::block::Block;
 use super::estimator::{EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight};
 use super::sharing::PathMemory;
 use super::sharing::Sharing;
@@ -25,6 +26,7 @@ use glam::Vec3;
 pub(super) struct Shading<'i, 'a, 'm, F: Features, E: LightEstimator<F>, R: Sharing> {
     pub(super) integrator: &'i PathIntegrator<'a, F, E, R>,
     pub(super) memory: &'i mut PathMemory<'m, E::State, R>,
+    pub(super) block: Block<'a>,
 }
 
 /// One path of a wave, with the states of the estimator and of sharing.
@@ -41,7 +43,10 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
     }
 
     fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
-        let Self { integrator, memory } = self;
+        if E::ADDS_NOTHING && !R::IN_CIRCLES {
+            return self.shade_block(wave, range, counters);
+        }
+        let Self { integrator, memory, .. } = self;
         let PathIntegrator { context, settings, estimator, .. } = integrator;
         // Placeholders of stateless estimators and sharing rules.
         let mut none = (E::State::zeroed(), R::State::zeroed());
@@ -176,7 +181,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     }
 
     /// Adds radiance of the environment along the escaping ray.
-    fn escape(&self, path: &mut PathState, state: &E::State, ray: &Ray) {
+    pub(super) fn escape(&self, path: &mut PathState, state: &E::State, ray: &Ray) {
         let scene = self.context.scene;
         let Some(environment) = scene.environment.as_ref().filter(|_| path.classes.has_environment()) else {
             return;
@@ -195,7 +200,13 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
 
     /// Adds emission of the surface at `point`.
     #[inline]
-    fn emission(&self, path: &mut PathState, state: &E::State, point: &SurfacePoint, direction: Vec3) {
+    pub(super) fn emission(
+        &self,
+        path: &mut PathState,
+        state: &E::State,
+        point: &SurfacePoint,
+        direction: Vec3,
+    ) {
         if !(point.material.emits() && path.classes.has_emission()) {
             return;
         }

@@ -1,6 +1,7 @@
 //! Dimensions of the sampler: the index of the random number of each choice of a camera path.
 
 use crate::sampling::Sampler;
+use halflight_simd::kernels::shade::numbers::Offsets;
 
 /// Position in the pixel.
 pub(in crate::transport) const PIXEL: u32 = 0;
@@ -34,6 +35,10 @@ const BSDF: u32 = 2;
 pub(in crate::transport) const LOBE: u32 = 3;
 /// Russian roulette.
 pub(in crate::transport) const ROULETTE: u32 = 4;
+
+/// Offsets for the numbers of blocks of vertices.
+pub(in crate::transport) const OFFSETS: Offsets =
+    Offsets { light: LIGHT, choice: LIGHT_CHOICE, scatter: BSDF, roulette: ROULETTE };
 
 /// First dimension of the vertex that ends segment `n`.
 #[inline]

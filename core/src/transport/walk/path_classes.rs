@@ -45,11 +45,13 @@ impl PathClasses {
     pub(in crate::transport) const WITHOUT_VISIBLE_EMITTERS: Self =
         Self(SPECULAR | ROUGH | CAUSTIC | BEHIND_SPECULAR);
 
+    #[inline]
     const fn has(self, class: u32) -> bool {
         self.0 & class != 0
     }
 
     /// Intersection of both sets.
+    #[inline]
     pub(in crate::transport) const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }

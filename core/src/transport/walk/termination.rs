@@ -2,6 +2,7 @@
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample};
+use halflight_simd::kernels::shade::bsdf::CERTAIN_FROM;
 
 /// Skipped surfaces after which a path is cut and counted as unfinished. Roulette makes this limit and
 /// [`MAX_VERTICES`] practically unreachable.
@@ -25,15 +26,10 @@ pub(in crate::transport) fn is_cut(segments: u32, bsdf: &Bsdf, sample: &BsdfSamp
     is_total || segments >= MAX_VERTICES
 }
 
-/// Throughput from which a path survives with certainty; below, the probability is proportional to it. There
-/// is no minimum number of segments: early ends of dark paths save the most time
-/// (docs/decisions/0023-russian-roulette.md).
-const CERTAIN_FROM: f32 = 0.25;
-
 /// Number of segments from which no path survives with certainty, so that paths end even between perfect
 /// mirrors. A fraction 1 / n of lossless paths reaches n times this length, with n times the light. Any fixed
 /// probability would make the variance of light that loses less than half as much infinite.
-const CERTAIN_BELOW: u32 = 16;
+pub(in crate::transport) const CERTAIN_BELOW: u32 = 16;
 
 /// Number of segments from which the continuation probability is at most 0.99.
 const ENDLESS: u32 = 2048;
@@ -42,12 +38,17 @@ const ENDLESS: u32 = 2048;
 /// refraction, which cancels when the light leaves the glass.
 #[inline]
 pub(in crate::transport) fn continuation_probability(segments: u32, throughput: Rgb) -> f32 {
-    let most = match segments {
+    (throughput.max_element() / CERTAIN_FROM).min(most_probable(segments))
+}
+
+/// Largest continuation probability of a path of `segments` segments.
+#[inline]
+pub(in crate::transport) fn most_probable(segments: u32) -> f32 {
+    match segments {
         0..CERTAIN_BELOW => 1.0,
         CERTAIN_BELOW..ENDLESS => 1.0 - 1.0 / segments as f32,
         _ => 0.99,
-    };
-    (throughput.max_element() / CERTAIN_FROM).min(most)
+    }
 }
 
 /// Upper bound of the fraction of light subpaths that reach `segments` segments. Nothing else ends paths

@@ -1,0 +1,173 @@
+//! Shading kernels at every level against their scalar references, in the lanes that exist, to the bit.
+
+use crate::numbers::coordinate;
+use arbitrary::{Result, Unstructured};
+use halflight_simd::Level;
+use halflight_simd::kernels::shade::bsdf::{BsdfBlock, Direct, LightBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
+use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock};
+use halflight_simd::kernels::shade::surface::Surfaces;
+use halflight_simd::kernels::shade::{Row, Row3};
+
+/// One input.
+pub fn run(data: &[u8]) {
+    let _ = attempt(&mut Unstructured::new(data));
+}
+
+/// Numbers of the input, repeated in other orders for rows beyond its end.
+struct Rows {
+    numbers: [f32; 64],
+    next: usize,
+}
+
+impl Rows {
+    fn row(&mut self) -> Row {
+        self.next += 1;
+        core::array::from_fn(|i| self.numbers[(self.next * 7 + i * (2 * self.next + 1)) % 64])
+    }
+
+    fn unit(&mut self) -> Row {
+        self.row().map(|x| if (0.0..1.0).contains(&x) { x } else { 0.5 })
+    }
+
+    fn vectors(&mut self) -> Row3 {
+        [self.row(), self.row(), self.row()]
+    }
+}
+
+fn same(a: f32, b: f32) -> bool {
+    a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan()
+}
+
+/// Asserts that both rows agree in the lanes of `set`.
+fn check(what: &str, set: u32, a: &[Row], b: &[Row]) {
+    for (a, b) in a.iter().zip(b) {
+        for i in (0..16).filter(|i| set >> i & 1 == 1) {
+            assert!(same(a[i], b[i]), "{what}, lane {i}: {} and {}", a[i], b[i]);
+        }
+    }
+}
+
+/// Asserts that both records agree in the lanes of `set`.
+fn check_records<const N: usize>(what: &str, set: u32, a: &[[f32; N]; 16], b: &[[f32; N]; 16]) {
+    for i in (0..16).filter(|i| set >> i & 1 == 1) {
+        assert!(a[i].iter().zip(&b[i]).all(|(&a, &b)| same(a, b)), "{what}, lane {i}: {:?} {:?}", a[i], b[i]);
+    }
+}
+
+fn attempt(input: &mut Unstructured) -> Result<()> {
+    let mut rows = Rows { numbers: [0.0; 64], next: 0 };
+    for number in &mut rows.numbers {
+        *number = coordinate(input)?;
+    }
+    let sets: [u16; 6] = input.arbitrary()?;
+    let [active, triangles, two_sided, diffuse, metal, flags] = sets.map(u32::from);
+    let corners = [rows.vectors(), rows.vectors(), rows.vectors()];
+    let normals = [rows.vectors(), rows.vectors(), rows.vectors()];
+    let weights = [rows.unit(), rows.unit()];
+    let mut views = [[0.0; 8]; 16];
+    views.as_flattened_mut().iter_mut().zip(rows.numbers.iter().cycle()).for_each(|(x, y)| *x = *y);
+    let normals = (flags & 1 == 0).then_some(&normals);
+    let surfaces = Surfaces { corners: &corners, normals, weights: &weights, rays: &views };
+    let surface = surfaces.reference();
+    let lights = EmitterBlock {
+        origin: rows.vectors(),
+        edges: [rows.vectors(), rows.vectors()],
+        normal: rows.vectors(),
+        area: rows.row(),
+        near: rows.row(),
+        triangles,
+        rectangles: flags & !triangles,
+        two_sided,
+    };
+    let (u, probability, side) = ([rows.unit(), rows.unit()], rows.unit(), rows.vectors());
+    let emitters = EmitterSamples {
+        lights: &lights,
+        from: &surface.position,
+        normal: &side,
+        u: &u,
+        probability: &probability,
+        active,
+    };
+    let bsdf =
+        BsdfBlock { reflectance: rows.vectors(), alpha: rows.unit(), diffuse, metal: metal & !diffuse };
+    let light = LightBlock {
+        direction: rows.vectors(),
+        end: rows.vectors(),
+        pdf: rows.row(),
+        radiance: rows.vectors(),
+        exists: active,
+        bounded: triangles,
+        area: two_sided,
+        delta: flags,
+        balance: metal,
+    };
+    let (value, pdf, throughput) = (rows.vectors(), rows.row(), rows.vectors());
+    let direct = Direct {
+        surface: &surface,
+        bsdf: &bsdf,
+        light: &light,
+        value: &value,
+        pdf: &pdf,
+        throughput: &throughput,
+    };
+    let given =
+        ScatterBlock { direction: rows.vectors(), weight: rows.vectors(), pdf: rows.row(), eta: rows.row() };
+    let (roulette, most, eta_squared) = (rows.unit(), rows.unit(), rows.row());
+    let scatter = Scatter {
+        surface: &surface,
+        bsdf: &bsdf,
+        given: &given,
+        u: &u,
+        roulette: &roulette,
+        most: &most,
+        throughput: &throughput,
+        eta_squared: &eta_squared,
+        active,
+    };
+    let mut samples = SampleBlock::EMPTY;
+    for i in 0..16 {
+        (samples.place[i], samples.index[i], samples.dimension[i]) =
+            (input.arbitrary()?, input.arbitrary()?, input.arbitrary()?);
+    }
+    let offsets = Offsets { light: 0, choice: 1, scatter: 2, roulette: 4 };
+    let raster = [rows.row(), rows.row()];
+    let camera = CameraRays {
+        eye: [0.0; 3],
+        axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]],
+        pixel: probability[0],
+        half: [320.0, 240.0],
+        raster: &raster,
+    };
+    for level in Level::detect().and_below() {
+        let found = surfaces.compute(level);
+        assert_eq!(found.regular, surface.regular, "{level:?}");
+        let set = surface.regular;
+        check("position", set, &found.position, &surface.position);
+        check("normal", set, &found.geometric_normal, &surface.geometric_normal);
+        check("frame", set, found.frame.as_flattened(), surface.frame.as_flattened());
+        check("viewer", set, &found.wo, &surface.wo);
+        check("error", set, &[found.error], &[surface.error]);
+
+        let (found, wanted) = (emitters.compute(level), emitters.reference());
+        assert_eq!(found.exists, wanted.exists, "{level:?}");
+        check("end", wanted.exists, &found.end, &wanted.end);
+        check("direction", wanted.exists, &found.direction, &wanted.direction);
+        check("density", wanted.exists, &[found.pdf], &[wanted.pdf]);
+
+        let (found, wanted) = (direct.compute(level), direct.reference());
+        assert_eq!(found.exists, wanted.exists, "{level:?}");
+        check_records("shadow ray", wanted.exists, &found.rays, &wanted.rays);
+        check_records("contribution", wanted.exists, &found.contribution, &wanted.contribution);
+
+        let (found, wanted) = (scatter.compute(level), scatter.reference());
+        assert_eq!(found.exists, wanted.exists, "{level:?}");
+        check_records("ray", wanted.exists, &found.rays, &wanted.rays);
+        check_records("state", wanted.exists, &found.states, &wanted.states);
+
+        assert_eq!(samples.vertices(level, offsets, true), samples.reference(offsets, true), "{level:?}");
+        check_records("camera ray", 0xffff, &camera.compute(level), &camera.reference());
+    }
+    Ok(())
+}

@@ -1,0 +1,49 @@
+//! Shading of blocks of sixteen vertices, in structures of arrays: random numbers, surface points, samples of
+//! area lights, BSDFs, and camera rays.
+//!
+//! A kernel is a function over lanes, which one f32 implements as well: with f32 it is the scalar reference,
+//! and every level gives its bits. Lanes without a vertex hold any values; their results are ignored.
+
+pub mod bsdf;
+pub mod camera;
+pub mod emitter;
+pub mod ggx;
+pub mod numbers;
+pub mod rectangle;
+pub mod surface;
+pub mod triangle;
+pub mod vector;
+pub mod warp;
+
+#[cfg(test)]
+mod tests;
+
+use crate::Simd;
+
+/// Number of vertices of a block.
+pub const BLOCK: usize = 16;
+
+/// One number of each vertex.
+pub type Row = [f32; BLOCK];
+
+/// One vector of each vertex, by coordinates.
+pub type Row3 = [Row; 3];
+
+/// Lanes of a vector from memory.
+#[inline(always)]
+fn load3<S: Simd>(simd: S, [x, y, z]: &Row3) -> [S::F16; 3] {
+    [simd.load16(x), simd.load16(y), simd.load16(z)]
+}
+
+/// Eight registers of sixteen, as sixteen records of eight floats.
+#[inline(always)]
+fn records8<S: Simd>(simd: S, [a, b, c, d, e, f, g, h]: [S::F16; 8]) -> [[f32; 8]; 16] {
+    let (first, second) = (simd.records16([a, b, c, d]), simd.records16([e, f, g, h]));
+    let mut records = [[0.0; 8]; 16];
+    for (record, (first, second)) in records.iter_mut().zip(first.iter().zip(&second)) {
+        let (low, high) = record.split_at_mut(4);
+        low.copy_from_slice(first);
+        high.copy_from_slice(second);
+    }
+    records
+}

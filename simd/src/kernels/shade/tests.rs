@@ -1,0 +1,243 @@
+//! Kernels against their scalar references, to the bit in the lanes that exist, on every level.
+
+use super::bsdf::{BsdfBlock, Direct, LightBlock, Scatter, ScatterBlock};
+use super::camera::CameraRays;
+use super::emitter::{EmitterBlock, EmitterSamples};
+use super::numbers::{mix, unit_float};
+use super::surface::Surfaces;
+use super::{Row, Row3};
+use crate::Level;
+
+/// Random numbers in [0, 1).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 += 1;
+        unit_float((mix(self.0) >> 32) as u32)
+    }
+
+    fn row(&mut self, from: f32, to: f32) -> Row {
+        core::array::from_fn(|_| from + (to - from) * self.next())
+    }
+
+    fn vectors(&mut self) -> Row3 {
+        [self.row(-1.0, 1.0), self.row(-1.0, 1.0), self.row(-1.0, 1.0)]
+    }
+
+    fn directions(&mut self) -> Row3 {
+        let mut rows = self.vectors();
+        for i in 0..16 {
+            let v = [rows[0][i], rows[1][i], rows[2][i]];
+            let length = libm::sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).max(1e-3);
+            (0..3).for_each(|k| rows[k][i] = v[k] / length);
+        }
+        // Axis-aligned in some lanes, with zeros of both signs.
+        (rows[0][3], rows[1][3], rows[2][3]) = (0.0, -0.0, -1.0);
+        (rows[0][4], rows[1][4], rows[2][4]) = (-0.0, 1.0, -0.0);
+        rows
+    }
+
+    fn bits(&mut self) -> u32 {
+        (self.next() * 65536.0) as u32
+    }
+}
+
+fn bits3(rows: &Row3, i: usize) -> [u32; 3] {
+    [0, 1, 2].map(|k| rows[k][i].to_bits())
+}
+
+/// Indices of the bits of `set`.
+fn lanes(set: u32) -> impl Iterator<Item = usize> {
+    (0..16).filter(move |i| set >> i & 1 == 1)
+}
+
+/// Emitters of all shapes, near and far.
+fn emitters(random: &mut Random) -> EmitterBlock {
+    let mut lights = EmitterBlock::EMPTY;
+    lights.origin = random.vectors();
+    lights.edges = [random.vectors(), random.vectors()];
+    lights.triangles = random.bits();
+    lights.rectangles = random.bits() & !lights.triangles;
+    lights.two_sided = random.bits();
+    for i in 0..16 {
+        let e0 = [0, 1, 2].map(|k| lights.edges[0][k][i]);
+        let mut e1 = [0, 1, 2].map(|k| lights.edges[1][k][i]);
+        if lights.rectangles >> i & 1 == 1 {
+            // Perpendicular to the first edge.
+            let along = (e0[0] * e1[0] + e0[1] * e1[1] + e0[2] * e1[2])
+                / (e0[0] * e0[0] + e0[1] * e0[1] + e0[2] * e0[2]).max(1e-6);
+            (0..3).for_each(|k| e1[k] -= along * e0[k]);
+            (0..3).for_each(|k| lights.edges[1][k][i] = e1[k]);
+        }
+        let across =
+            [e0[1] * e1[2] - e0[2] * e1[1], e0[2] * e1[0] - e0[0] * e1[2], e0[0] * e1[1] - e0[1] * e1[0]];
+        let area = libm::sqrtf(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
+        (0..3).for_each(|k| lights.normal[k][i] = across[k] / area.max(1e-6));
+        lights.area[i] = area;
+    }
+    lights.near = random.row(0.0, 8.0);
+    lights
+}
+
+#[test]
+fn surface_points_agree_with_the_reference_on_every_level() {
+    let mut random = Random(1);
+    for round in 0..400 {
+        let corners = [random.vectors(), random.vectors(), random.vectors()];
+        let normals = [random.directions(), random.directions(), random.directions()];
+        let weights = [random.row(0.0, 0.5), random.row(0.0, 0.5)];
+        let directions = random.directions();
+        let rays = core::array::from_fn(|i| {
+            let [x, y, z] = [0, 1, 2].map(|k| directions[k][i]);
+            [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
+        });
+        let normals = (round % 2 == 0).then_some(&normals);
+        let surfaces = Surfaces { corners: &corners, normals, weights: &weights, rays: &rays };
+        let wanted = surfaces.reference();
+        for level in Level::detect().and_below() {
+            let found = surfaces.compute(level);
+            assert_eq!((found.front, found.regular), (wanted.front, wanted.regular), "{level:?}");
+            for i in lanes(wanted.regular) {
+                let all = |block: &super::surface::SurfaceBlock| {
+                    let [t, b, n] = &block.frame;
+                    let rows = [&block.position, &block.geometric_normal, t, b, n, &block.wo];
+                    (rows.map(|rows| bits3(rows, i)), block.error[i].to_bits())
+                };
+                assert_eq!(all(&found), all(&wanted), "{level:?} {round} {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn light_samples_agree_with_the_reference_on_every_level() {
+    let mut random = Random(2);
+    let mut count = 0;
+    for _ in 0..400 {
+        let lights = emitters(&mut random);
+        let (from, normal) = (random.vectors(), random.directions());
+        let u = [random.row(0.0, 1.0), random.row(0.0, 1.0)];
+        let probability = random.row(0.1, 1.0);
+        let active = random.bits();
+        let samples = EmitterSamples {
+            lights: &lights,
+            from: &from,
+            normal: &normal,
+            u: &u,
+            probability: &probability,
+            active,
+        };
+        let wanted = samples.reference();
+        count += wanted.exists.count_ones();
+        for level in Level::detect().and_below() {
+            let found = samples.compute(level);
+            assert_eq!(found.exists, wanted.exists, "{level:?}");
+            for i in lanes(wanted.exists) {
+                let all = |block: &super::emitter::EmitterSampleBlock| {
+                    let flags = [block.front, block.second].map(|bits| bits >> i & 1);
+                    (bits3(&block.end, i), bits3(&block.direction, i), block.pdf[i].to_bits(), flags)
+                };
+                assert_eq!(all(&found), all(&wanted), "{level:?}");
+            }
+        }
+    }
+    assert!(count > 1000, "{count} samples");
+}
+
+#[test]
+fn scattering_agrees_with_the_reference_on_every_level() {
+    let mut random = Random(3);
+    let (mut shadows, mut rays) = (0, 0);
+    for _ in 0..400 {
+        let corners = [random.vectors(), random.vectors(), random.vectors()];
+        let weights = [random.row(0.0, 0.5), random.row(0.0, 0.5)];
+        let directions = random.directions();
+        let views = core::array::from_fn(|i| {
+            let [x, y, z] = [0, 1, 2].map(|k| directions[k][i]);
+            [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
+        });
+        let surface =
+            Surfaces { corners: &corners, normals: None, weights: &weights, rays: &views }.reference();
+        let diffuse = random.bits();
+        let metal = random.bits() & !diffuse;
+        let reflectance = [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)];
+        let bsdf = BsdfBlock { reflectance, alpha: random.row(0.01, 1.0), diffuse, metal };
+        let light = LightBlock {
+            direction: random.directions(),
+            end: random.vectors(),
+            pdf: random.row(0.01, 4.0),
+            radiance: [random.row(0.0, 9.0), random.row(0.0, 9.0), random.row(0.0, 9.0)],
+            exists: random.bits() & surface.regular,
+            bounded: random.bits(),
+            area: random.bits(),
+            delta: random.bits() & random.bits(),
+            balance: random.bits(),
+        };
+        let (value, pdf, throughput) = (random.directions(), random.row(0.0, 1.0), random.directions());
+        let direct = Direct {
+            surface: &surface,
+            bsdf: &bsdf,
+            light: &light,
+            value: &value,
+            pdf: &pdf,
+            throughput: &throughput,
+        };
+        let given = ScatterBlock {
+            direction: random.directions(),
+            weight: random.vectors(),
+            pdf: random.row(0.0, 1.0),
+            eta: random.row(0.7, 1.5),
+        };
+        let u = [random.row(0.0, 1.0), random.row(0.0, 1.0)];
+        let (roulette, most, eta_squared) =
+            (random.row(0.0, 1.0), random.row(0.9, 1.0), random.row(0.5, 2.0));
+        let scatter = Scatter {
+            surface: &surface,
+            bsdf: &bsdf,
+            given: &given,
+            u: &u,
+            roulette: &roulette,
+            most: &most,
+            throughput: &throughput,
+            eta_squared: &eta_squared,
+            active: random.bits() & surface.regular,
+        };
+        let (lit, next) = (direct.reference(), scatter.reference());
+        shadows += lit.exists.count_ones();
+        rays += next.exists.count_ones();
+        for level in Level::detect().and_below() {
+            let found = direct.compute(level);
+            assert_eq!(found.exists, lit.exists, "{level:?}");
+            for i in lanes(lit.exists) {
+                assert_eq!(found.rays[i].map(f32::to_bits), lit.rays[i].map(f32::to_bits), "{level:?}");
+                let contributions = [found.contribution[i], lit.contribution[i]];
+                assert_eq!(contributions[0], contributions[1], "{level:?}");
+            }
+            let found = scatter.compute(level);
+            assert_eq!(found.exists, next.exists, "{level:?}");
+            for i in lanes(next.exists) {
+                assert_eq!(found.rays[i].map(f32::to_bits), next.rays[i].map(f32::to_bits), "{level:?}");
+                assert_eq!(found.states[i], next.states[i], "{level:?}");
+                assert_eq!(found.normals[i], next.normals[i], "{level:?}");
+            }
+        }
+    }
+    assert!(shadows > 500 && rays > 500, "{shadows} shadow rays, {rays} rays");
+}
+
+#[test]
+fn camera_rays_agree_with_the_reference_on_every_level() {
+    let mut random = Random(4);
+    for _ in 0..100 {
+        let raster = [random.row(0.0, 640.0), random.row(0.0, 480.0)];
+        let axes = [random.directions(), random.directions(), random.directions()]
+            .map(|d| [d[0][0], d[1][0], d[2][0]]);
+        let rays =
+            CameraRays { eye: [1.0, -2.0, 3.0], axes, pixel: 0.002, half: [320.0, 240.0], raster: &raster };
+        let wanted = rays.reference();
+        for level in Level::detect().and_below() {
+            assert_eq!(rays.compute(level), wanted, "{level:?}");
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Random blocks of vertices in a box under a square lamp, and the kernels that shade them.
+
+use core::hint::black_box;
+use halflight_core::Level;
+use halflight_core::sampling::{mix, unit_float};
+use halflight_simd::kernels::shade::bsdf::{BsdfBlock, Direct, LightBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
+use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
+use halflight_simd::kernels::shade::{Row, Row3};
+
+/// Kernel by name.
+pub(super) struct Kernel {
+    pub(super) name: &'static str,
+    /// Shades one block by lanes of a level, or by the scalar reference.
+    pub(super) run: fn(&Blocks, usize, Option<Level>),
+}
+
+/// Kernels in the order of a path.
+pub(super) const KERNELS: &[Kernel] = &[
+    Kernel { name: "camera rays", run: |blocks, i, level| blocks.0[i].camera(level) },
+    Kernel { name: "surface points", run: |blocks, i, level| blocks.0[i].surface(level) },
+    Kernel { name: "numbers of a vertex", run: |blocks, i, level| blocks.0[i].numbers(level) },
+    Kernel { name: "near rectangle lights", run: |blocks, i, level| blocks.0[i].light(level) },
+    Kernel { name: "light on diffuse", run: |blocks, i, level| blocks.0[i].direct(DIFFUSE, level) },
+    Kernel { name: "light on rough metal", run: |blocks, i, level| blocks.0[i].direct(METAL, level) },
+    Kernel { name: "scattering, diffuse", run: |blocks, i, level| blocks.0[i].scatter(DIFFUSE, level) },
+    Kernel { name: "scattering, rough metal", run: |blocks, i, level| blocks.0[i].scatter(METAL, level) },
+];
+
+const DIFFUSE: usize = 0;
+const METAL: usize = 1;
+
+const OFFSETS: Offsets = Offsets { light: 0, choice: 1, scatter: 2, roulette: 4 };
+
+/// Blocks of vertices.
+pub(super) struct Blocks(Vec<Block>);
+
+impl Blocks {
+    pub(super) fn new(count: usize) -> Self {
+        Self((0..count).map(|i| Block::new(i as u64)).collect())
+    }
+}
+
+struct Block {
+    corners: [Row3; 3],
+    weights: [Row; 2],
+    rays: [[f32; 8]; 16],
+    surface: SurfaceBlock,
+    samples: SampleBlock,
+    numbers: VertexNumbers,
+    lights: EmitterBlock,
+    light: LightBlock,
+    bsdfs: [BsdfBlock; 2],
+    given: ScatterBlock,
+    ones: Row3,
+    raster: [Row; 2],
+}
+
+impl Block {
+    fn new(seed: u64) -> Self {
+        let mut counter = seed << 32;
+        let mut random = || {
+            counter += 1;
+            unit_float((mix(counter) >> 32) as u32)
+        };
+        let mut row = |from: f32, to: f32| -> Row { core::array::from_fn(|_| from + (to - from) * random()) };
+        let corner = |row: &mut dyn FnMut(f32, f32) -> Row| [row(-1.0, 1.0), row(0.0, 0.2), row(-1.0, 1.0)];
+        let corners = [corner(&mut row), corner(&mut row), corner(&mut row)];
+        let weights = [row(0.0, 0.5), row(0.0, 0.5)];
+        let ways = [row(-1.0, 1.0), row(-1.0, -0.2), row(-1.0, 1.0)];
+        let rays = core::array::from_fn(|i| {
+            let [x, y, z] = [0, 1, 2].map(|k| ways[k][i]);
+            let length = (x * x + y * y + z * z).sqrt();
+            [0.0, 1.0, 0.0, f32::INFINITY, x / length, y / length, z / length, 0.0]
+        });
+        let surface =
+            Surfaces { corners: &corners, normals: None, weights: &weights, rays: &rays }.reference();
+        let mut samples = SampleBlock::EMPTY;
+        for i in 0..16 {
+            samples.place[i] = seed << 8 | i as u64;
+            samples.index[i] = seed as u32;
+            samples.dimension[i] = 7;
+        }
+        let numbers = samples.reference(OFFSETS, true);
+        // A square lamp of side 1 at the height 2, which shines downwards.
+        let mut lights = EmitterBlock::EMPTY;
+        lights.origin = [[-0.5; 16], [2.0; 16], [-0.5; 16]];
+        lights.edges = [[[1.0; 16], [0.0; 16], [0.0; 16]], [[0.0; 16], [0.0; 16], [1.0; 16]]];
+        lights.normal = [[0.0; 16], [-1.0; 16], [0.0; 16]];
+        (lights.area, lights.near, lights.rectangles) = ([1.0; 16], [9.0; 16], 0xffff);
+        let probability = [1.0; 16];
+        let EmitterSampleBlock { end, direction, pdf, exists, .. } = EmitterSamples {
+            lights: &lights,
+            from: &surface.position,
+            normal: &surface.frame[2],
+            u: &numbers.light,
+            probability: &probability,
+            active: 0xffff,
+        }
+        .reference();
+        let light = LightBlock {
+            direction,
+            end,
+            pdf,
+            exists,
+            bounded: exists,
+            area: exists,
+            ..LightBlock { radiance: [[1.0; 16]; 3], ..LightBlock::EMPTY }
+        };
+        let reflectance = [[0.8; 16], [0.6; 16], [0.4; 16]];
+        let alpha = [0.2; 16];
+        let bsdfs = [
+            BsdfBlock { reflectance, alpha, diffuse: 0xffff, metal: 0 },
+            BsdfBlock { reflectance, alpha, diffuse: 0, metal: 0xffff },
+        ];
+        let raster = [row(0.0, 640.0), row(0.0, 480.0)];
+        Self {
+            corners,
+            weights,
+            rays,
+            surface,
+            samples,
+            numbers,
+            lights,
+            light,
+            bsdfs,
+            given: ScatterBlock::EMPTY,
+            ones: [[1.0; 16]; 3],
+            raster,
+        }
+    }
+
+    fn camera(&self, level: Option<Level>) {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
+        let raster = &self.raster;
+        let rays = CameraRays { eye: [0.0; 3], axes, pixel: 0.002, half: [320.0, 240.0], raster };
+        black_box(level.map_or_else(|| rays.reference(), |level| rays.compute(level)));
+    }
+
+    fn surface(&self, level: Option<Level>) {
+        let Self { corners, weights, rays, .. } = self;
+        let surfaces = Surfaces { corners, normals: None, weights, rays };
+        black_box(level.map_or_else(|| surfaces.reference(), |level| surfaces.compute(level)));
+    }
+
+    fn numbers(&self, level: Option<Level>) {
+        let samples = &self.samples;
+        black_box(level.map_or_else(
+            || samples.reference(OFFSETS, true),
+            |level| samples.vertices(level, OFFSETS, true),
+        ));
+    }
+
+    fn light(&self, level: Option<Level>) {
+        let samples = EmitterSamples {
+            lights: &self.lights,
+            from: &self.surface.position,
+            normal: &self.surface.frame[2],
+            u: &self.numbers.light,
+            probability: &self.ones[0],
+            active: 0xffff,
+        };
+        black_box(level.map_or_else(|| samples.reference(), |level| samples.compute(level)));
+    }
+
+    fn direct(&self, bsdf: usize, level: Option<Level>) {
+        let direct = Direct {
+            surface: &self.surface,
+            bsdf: &self.bsdfs[bsdf],
+            light: &self.light,
+            value: &self.ones,
+            pdf: &self.ones[0],
+            throughput: &self.ones,
+        };
+        black_box(level.map_or_else(|| direct.reference(), |level| direct.compute(level)));
+    }
+
+    fn scatter(&self, bsdf: usize, level: Option<Level>) {
+        let scatter = Scatter {
+            surface: &self.surface,
+            bsdf: &self.bsdfs[bsdf],
+            given: &self.given,
+            u: &self.numbers.scatter,
+            roulette: &self.numbers.roulette,
+            most: &self.ones[0],
+            throughput: &self.ones,
+            eta_squared: &self.ones[0],
+            active: 0xffff,
+        };
+        black_box(level.map_or_else(|| scatter.reference(), |level| scatter.compute(level)));
+    }
+}
