@@ -2,7 +2,8 @@
 
     HALFLIGHT=program python3 tests/peers/methods.py [--budgets 1.5 7.5] [--scenes NAME,...] [--methods NAME,...] [--rooms SEED ...]
 
-`--rooms` measures rooms by random numbers (random_rooms.py) in place of the scenes. Each method renders 128 x 128 pixels for the seconds of a budget on one thread, one seed after the other. The table
+`--rooms` measures rooms by random numbers (random_rooms.py) in place of the scenes. A second table has the mean of the pictures over that of the reference, and how many standard errors it is from one: z, by
+the spread of two or more seeds. Biased methods may differ; others may not. Each method renders 128 x 128 pixels for the seconds of a budget on one thread, one seed after the other. The table
 has relMSE; the regret of `auto` is its error over that of the best other method. References are pictures of
 another seed by a method that suits the scene, kept in the output folder; the noise that they estimate of
 themselves is subtracted. Runs are kept, too: a second call renders those that are missing. Needs numpy, and
@@ -59,7 +60,7 @@ def reference_method(name):
     """Method of the reference of scene `name`."""
     if not name.startswith("room-"):
         return SCENES[name]
-    return {"door": "bdpt", "spot": "bdpt", "glass ball": "vcm", "sun": "bdpt"}.get(random_rooms.light(int(name[5:])), "path")
+    return {"door": "bdpt", "spot": "bdpt", "glass ball": "path", "sun": "bdpt"}.get(random_rooms.light(int(name[5:])), "path")
 
 
 def render(scene, flags, threads=1):
@@ -124,7 +125,10 @@ def main():
             out.write(json.dumps(row) + "\n")
             out.flush()
     for budget in a.budgets:
-        table([row for row in rows if row["budget"] == budget and row["scene"] in names], budget)
+        chosen = [row for row in rows if row["budget"] == budget and row["scene"] in names]
+        table(chosen, budget)
+        if a.seeds > 1:
+            agreement(chosen, budget, converged)
 
 
 def table(rows, budget):
@@ -148,6 +152,30 @@ def table(rows, budget):
         print(f"| {scene} | " + " | ".join(cells) + f" | {', '.join(sorted(chosen))} | {regret:.2f} |")
     if regrets:
         print(f"\nGeometric mean of the regret: {math.exp(sum(map(math.log, regrets)) / len(regrets)):.2f}")
+
+
+def mean_error(picture, left):
+    """Relative standard error of the mean of a picture whose pixels have the relMSE `left`."""
+    weights = picture**2 + 0.01 * picture.mean() ** 2
+    return math.sqrt(left * float(weights.sum())) / float(picture.sum())
+
+
+def agreement(rows, budget, references):
+    """Mean over that of the reference in percent, and z."""
+    methods = [method for method in METHODS if any(row["method"] == method for row in rows)]
+    print(f"\nmeans after {budget:g} s\n\n| scene | reference | " + " | ".join(methods) + " |")
+    print("|---" * (len(methods) + 2) + "|")
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        own = mean_error(*references[scene])
+        cells = []
+        for method in methods:
+            means = np.array([row["mean"] for row in rows if (row["scene"], row["method"]) == (scene, method)])
+            if len(means) < 2:
+                cells.append("–")
+                continue
+            error = math.hypot(means.std(ddof=1) / math.sqrt(len(means)), own)
+            cells.append(f"{100 * (means.mean() - 1):+.1f} ({(means.mean() - 1) / error:+.1f})")
+        print(f"| {scene} | ±{100 * own:.2f} | " + " | ".join(cells) + " |")
 
 
 if __name__ == "__main__":

@@ -7,10 +7,10 @@
 //! and not in seconds: the choice follows from scene, settings, seed, memory and, where time is limited, the
 //! number of threads.
 
-use super::RenderContext;
 use super::caustics::{self, CausticPathTracing};
 use super::counts::{self, LightPaths};
 use super::executor::{Executor, Passed};
+use super::{RAYS_PER_SECOND, RenderContext};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::estimate::RELMSE_OFFSET;
@@ -28,13 +28,13 @@ const SAMPLES: u32 = 4;
 /// Pixels of a block.
 const BLOCK: usize = 64;
 
-/// Rays per second and thread, by which a time limit becomes work. No clock is read.
-const RAYS_PER_SECOND: f64 = 6e6;
-
 /// Rays of a trial, its greatest fraction of the work, and rays of a sample before a trial has counted them.
 const TRIAL_RAYS: f64 = 2.5e5;
 const TRIAL_SHARE: f64 = 0.25;
 const RAYS_PER_SAMPLE: f64 = 8.0;
+
+/// Fewest samples of a pixel for which another method is worth its structures.
+const FEWEST_SAMPLES: f64 = 4.0;
 
 /// Rays of the pilot of counts, and its greatest fraction of the work.
 const PILOT_RAYS: f64 = 5e5;
@@ -89,7 +89,8 @@ impl Goal {
         let time = self.seconds.map(|seconds| seconds * RAYS_PER_SECOND);
         let samples = self.samples.map(|samples| f64::from(samples) * pixels as f64 * RAYS_PER_SAMPLE);
         let rays = [time, samples].into_iter().flatten().fold(f64::INFINITY, f64::min);
-        rays > TRIAL_RAYS / TRIAL_SHARE
+        let fewest = time.map_or(0.0, |_| FEWEST_SAMPLES * RAYS_PER_SAMPLE * pixels as f64);
+        rays > fewest.max(TRIAL_RAYS / TRIAL_SHARE)
     }
 }
 

@@ -27,6 +27,9 @@ pub mod round;
 mod splats;
 pub mod sppm;
 
+/// Rays per second and thread by which a time limit becomes work. No clock is read.
+pub const RAYS_PER_SECOND: f64 = 6e6;
+
 pub use executor::{Executor, Loop, Passed, Worker};
 pub use photon_map_store::{PhotonMapPair, PhotonMapStore};
 pub use photons::{MapUse, PhotonSettings, PhotonUse};

@@ -13,12 +13,14 @@ use crate::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettin
 pub(super) const FIRST_RADIUS: f64 = 1.0;
 
 /// Settings of the prepass of caustic photons.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CausticSettings {
     /// True if an irradiance cache supplies the light that rough surfaces reflect.
     pub beside_records: bool,
     /// Bytes that photon maps leave to other structures.
     pub reserved: usize,
+    /// Rays that the time of the picture allows, if it is limited.
+    pub most_rays: Option<f64>,
 }
 
 /// Emission and density estimation of caustic photons.

@@ -20,6 +20,12 @@ const PATHS_PER_SAMPLE: f64 = 0.5;
 const FEWEST_PATHS: usize = 16 * PATHS_PER_TASK;
 const MOST_PATHS: usize = 4096 * PATHS_PER_TASK;
 
+/// Fraction of the work of a picture for its first maps, one pair for samples and one for records; and rays
+/// whose time a light path takes, with its photons in a map.
+const FIRST_SHARE: f64 = 0.2;
+const FIRST_MAPS: f64 = 4.0;
+const RAYS_PER_PATH: f64 = 16.0;
+
 /// Samples that share a pair of maps, at most: fewer would not fill the wavefront of a tile.
 const MOST_SAMPLES: u32 = 8;
 
@@ -106,8 +112,10 @@ impl<'a> CausticPhotons<'a> {
         settings: CausticSettings,
         memory: &mut impl MemorySource<'a>,
     ) -> Result<Option<Self>, OutOfMemory> {
-        let CausticSettings { beside_records, reserved, .. } = settings;
+        let CausticSettings { beside_records, reserved, most_rays } = settings;
         let paths = emission.benefit.photon_budget() * PATHS_PER_SAMPLE * context.pixels() as f64;
+        let in_time = most_rays.map(|rays| rays * FIRST_SHARE / (FIRST_MAPS * RAYS_PER_PATH));
+        let paths = in_time.map_or(paths, |most| paths.min(most));
         let paths_per_sample = (paths as usize).clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted =
             (paths_per_sample * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS_PER_TASK);

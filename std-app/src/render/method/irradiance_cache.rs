@@ -51,7 +51,7 @@ fn find_caustics<'m, F: Features>(
     let mut scratch = memory.take_each("paths", scratch, workers.count())?;
     let context = setup.context();
     let mut paths = PathTracing::<F>::plain(&context);
-    let settings = CausticSettings { beside_records: true, reserved };
+    let settings = CausticSettings { beside_records: true, reserved, most_rays: setup.most_rays() };
     let mut executor = Threads::new(workers, &mut scratch);
     let Prepass { decision, share, lacks_memory } =
         prepass(&context, &mut paths, settings, memory, &mut executor)?;
@@ -106,7 +106,8 @@ impl<'m, F: Features> Cached<'m, F> {
         let photons = match emission {
             Some(emission) => {
                 let reserved = later(&cache);
-                let settings = CausticSettings { beside_records: true, reserved };
+                let settings =
+                    CausticSettings { beside_records: true, reserved, most_rays: setup.most_rays() };
                 CausticPhotons::new(&setup.context(), emission, settings, memory)?
             }
             None => None,

@@ -40,7 +40,7 @@ use halflight_core::method::instant_radiosity::InstantRadiosity;
 use halflight_core::method::metropolis::Metropolis;
 use halflight_core::method::photon_map::PhotonMapping;
 use halflight_core::method::sppm::ProgressivePhotonMapping;
-use halflight_core::method::{Method as CoreMethod, RenderContext};
+use halflight_core::method::{Method as CoreMethod, RAYS_PER_SECOND, RenderContext};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
 use prepared::Prepared;
@@ -168,6 +168,12 @@ impl<'a> RenderSetup<'a> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         let paths = PathSettings { seed, ..path_settings(settings) };
         PathIntegrator::new(scene, bvh, lights, paths, settings.level)
+    }
+
+    /// Rays that the time of the picture allows, if it is limited.
+    pub(super) fn most_rays(&self) -> Option<f64> {
+        let seconds = self.settings.stop.seconds?;
+        Some(seconds * self.workers.count() as f64 * RAYS_PER_SECOND)
     }
 
     /// Context for methods of the core.

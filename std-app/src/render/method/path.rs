@@ -46,6 +46,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
         true => {
             let settings = CausticSettings {
                 beside_records: false,
+                most_rays: setup.most_rays(),
                 reserved: Audit::bytes::<F>(setup, Method::Path.is_biased()),
             };
             CausticPathTracing::new(&context, paths, settings, memory, &mut executor)?
