@@ -111,12 +111,12 @@ fn brightest_first(found: &mut [GuideSample]) -> impl Iterator<Item = &GuideSamp
 }
 
 impl Benefit {
-    /// By the light paths `found`, in discs of `radius` pixels, for a picture of `pixels` pixels in which
-    /// all other light has a `mean` radiance. Sorts `found`.
+    /// Benefit by the light paths `found`, with kernels of `radius` pixels, for a picture of `pixels` pixels
+    /// in which all other light has a `mean` radiance. Sorts `found`.
     pub(super) fn new(found: &mut [GuideSample], radius: f64, pixels: f64, mean: f64) -> Self {
         // Power over the area of a disc, on a diffuse surface of albedo 0.5.
-        let worth = found.iter().map(|path| f64::from(path.worth)).sum::<f64>();
-        let radiance = 0.5 / PI * worth * radius * radius / pixels;
+        let benefit = found.iter().map(|path| f64::from(path.benefit)).sum::<f64>();
+        let radiance = 0.5 / PI * benefit * radius * radius / pixels;
         let share = if radiance > 0.0 { radiance / (mean + radiance) } else { 0.0 };
         let visible = visible(found);
 
@@ -160,12 +160,12 @@ impl Benefit {
         (self.share / (BUDGET_RATIO * (1.0 - self.share))).clamp(1.0, MOST_BUDGET)
     }
 
-    /// Whether more light paths may find that photons pay.
+    /// True if more light paths may find that photons pay.
     pub(super) fn may_pay(&self) -> bool {
         self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= DOUBT_VISIBLE * LEAST_VISIBLE
     }
 
-    /// Whether photons may pay; `None` where that depends on the noise of the picture, for
+    /// True if photons may pay; `None` where that depends on the noise of the picture, for
     /// [`Benefit::pays_beside`].
     pub(super) fn pays(&self) -> Option<bool> {
         if self.share >= LEAST_SHARE {
@@ -174,7 +174,7 @@ impl Benefit {
         (self.visible < LEAST_VISIBLE).then_some(false)
     }
 
-    /// Whether photons may pay in a picture whose samples have the relative variance `noise`.
+    /// True if photons may pay in a picture whose samples have the relative variance `noise`.
     pub(super) fn pays_beside(&self, noise: f64) -> bool {
         self.noise >= LEAST_NOISE * noise
     }
@@ -198,7 +198,7 @@ pub(super) struct PathTracingCost {
 }
 
 impl PathTracingCost {
-    /// Whether the variance times the work is larger than that of paths with photons, by their `pilot`, whose
+    /// True if the variance times the work is larger than that of paths with photons, by their `pilot`, whose
     /// light paths take `light_rays` for each sample of a pixel.
     pub(super) fn exceeds(&self, pilot: &Pilot, has_reuse: bool, light_rays: f64) -> bool {
         let work = GATHERING * pilot.work(has_reuse) + light_rays;
@@ -213,7 +213,7 @@ mod tests {
     const PIXELS: f64 = 1024.0;
 
     fn path(light: f32, hits: f32, flash: f32) -> GuideSample {
-        GuideSample { worth: light, light, hits, flash, ..GuideSample::default() }
+        GuideSample { benefit: light, light, hits, flash, ..GuideSample::default() }
     }
 
     #[test]

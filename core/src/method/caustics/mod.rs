@@ -33,7 +33,7 @@ pub fn scratch<F: Features>() -> Footprint {
         .or(CausticPhotonTracer::<F>::scratch())
 }
 
-/// Whether `scene` has casters, receivers and light.
+/// True if `scene` has casters, receivers and light.
 pub fn are_possible(scene: &Scene) -> bool {
     let census = Census::of(scene);
     let kinds = &census.surfaces;
@@ -41,7 +41,7 @@ pub fn are_possible(scene: &Scene) -> bool {
     casters > 0 && kinds.diffuse + kinds.glossy > 0 && census.has_light()
 }
 
-/// Whether paths were joined with caustic photons.
+/// Use of caustic photons beside paths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CausticUse {
     /// They were.
@@ -111,12 +111,12 @@ impl<'a, F: Features> CausticPathTracing<'a, F> {
         Self { paths, photons: None, finding: CausticUse { used: false, ..finding } }
     }
 
-    /// Whether photons are used, and why.
+    /// Use of photons, and the reason.
     pub fn finding(&self) -> CausticUse {
         self.finding
     }
 
-    /// Whether neighbouring pixels reuse paths, and why.
+    /// Use of path reuse, and its pilot.
     pub fn reuse(&self) -> Reuse {
         self.paths.reuse()
     }

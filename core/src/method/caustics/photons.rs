@@ -142,7 +142,7 @@ impl<'a> CausticPhotons<'a> {
         self.statistics
     }
 
-    /// Whether the photons of the first samples leave less variance for the work than `paths` alone. They are
+    /// True if the photons of the first samples leave less variance for the work than `paths` alone. They are
     /// then the photons of the first samples of the picture.
     ///
     /// # Errors

@@ -22,13 +22,13 @@ const AIMED_MAP: u32 = 0;
 const LEARNED_MAP: u32 = 1;
 const AUDIT_MAP: u32 = 0x7fff_ff00;
 
-/// How often the paths of an audit must find light to know of it.
+/// Fewest hits by the paths of an audit at which they measure a light.
 const FEWEST_HITS: f64 = 64.0;
 
 /// The name of the emission sampler and its guide in reports of memory.
 const EMISSION: &str = "emission";
 
-/// Whether photons suit a picture.
+/// Decision of the prepass: paths alone, or with photons.
 pub enum Decision<'a> {
     /// Paths alone.
     Paths,
@@ -201,12 +201,12 @@ impl<E: Executor> LightPaths<'_, E> {
         found.fill(GuideSample::default());
         let pieces = found.get_mut(..count).unwrap_or_default().chunks_mut(PATHS_PER_TASK);
         let _ = executor
-            .pass(pieces, |task, found, worker| tracer.look(task, map, &mut worker.scratch, found))?;
+            .pass(pieces, |task, found, worker| tracer.sample_guide(task, map, &mut worker.scratch, found))?;
         Ok(())
     }
 
     fn teach(&self, stats: &mut GuideStats) {
-        self.found.iter().for_each(|path| stats.learn(path.cell, path.worth));
+        self.found.iter().for_each(|path| stats.learn(path.cell, path.benefit));
     }
 }
 

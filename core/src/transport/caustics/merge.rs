@@ -1,46 +1,43 @@
-//! Paths joined with photons of caustics: vertex merging (Georgiev et al. 2012) for light that comes to a
-//! rough surface by mirrors and glass, and multiple importance sampling over all that finds such light.
+//! Paths merged with caustic photons: vertex merging (Georgiev et al. 2012) of light that casters send to a
+//! receiver, with multiple importance sampling over all techniques that sample such light.
 //!
-//! Let x₀ be on a light, x₁ … x₍ⱼ₋₁₎ on surfaces that are not rough, x = xⱼ the first rough one, behind which
-//! the path goes on to the eye in whatever way. It can be found
-//! 1. by the path tracer, which goes from x by chance to x₀;
-//! 2. by the path tracer, which goes to x₁ and chooses x₀, where x₁ reflects into more than one direction;
-//! 3. by a photon that comes from x₀ by way of x, where it has its weight from, and lies within a disc around
-//!    the first rough surface on the way from the eye, x, or one that x lights; or the first whose disc is
-//!    wide enough.
+//! Let x₀ be on a light, x₁ … x₍ⱼ₋₁₎ on casters and x = xⱼ on the first receiver, from which the path
+//! continues to the camera in any way. Three techniques sample it:
+//! 1. BSDF sampling of the path tracer from x to x₀;
+//! 2. next-event estimation of the path tracer at x₁, if x₁ reflects into more than one direction;
+//! 3. a photon from x₀, weighted at x, in the kernel at the merging vertex. This vertex is the first receiver
+//!    from the camera whose kernel is wide enough: x, or a receiver that x lights.
 //!
-//! Every other path is found by the path tracer alone. So a path has one vertex at most at which it can be
-//! merged. Where the eye sees x, it has three densities, which have all that lies behind x in common. Else
-//! the third is reckoned as if photons were gathered at x: with discs of one size it is the same, as a
-//! diffuse surface leaves the ratio of both as it is, and weights are right as long as all agree on them. But
-//! gathered they are not at x, which paths from the eye may meet so rarely that each that does would be a
-//! spike (`docs/decisions/0042-photons-past-the-first-receiver.md`). Nor is light gathered on a disc much
-//! smaller than that where it comes from, as right before the eye: there each photon would be one. Both ends
-//! know these two discs, and so where the one vertex is (`docs/decisions/0045-kernel-radii.md`). With étendue
-//! in place of areas (`light/emission/pdf.rs`) distances cancel, and the third over the first is
+//! The path tracer alone samples all other paths, so a path has at most one merging vertex. If the camera
+//! sees x, the three densities share all factors of the path behind x. Otherwise the third is computed as if
+//! photons were gathered at x. A diffuse surface keeps the ratio of densities for kernels of equal size, and
+//! weights are right as long as all techniques use the same. Photons are not gathered at x itself: a camera
+//! path that meets x by chance would be a firefly (`docs/decisions/0042-photons-past-the-first-receiver.md`).
+//! Nor are they gathered in a kernel much smaller than the one where their light was scattered last, as close
+//! to the camera, where each photon would be a firefly. Camera and light paths both know the two kernels, and
+//! hence the merging vertex (`docs/decisions/0045-kernel-radii.md`). With étendue instead of areas
+//! (`light/emission/pdf.rs`) distances cancel, and the third density over the first is
 //!
 //!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
 //!   ρᵢ = p(x₍ᵢ₋₁₎ → xᵢ → x₍ᵢ₊₁₎) cos θ(x₍ᵢ₋₁₎) / (p(x₍ᵢ₊₁₎ → xᵢ → x₍ᵢ₋₁₎) cos θ(x₍ᵢ₊₁₎))
 //!
-//! of N light paths and discs of radius r. At a mirror ρ = 1; where light is refracted, the squared ratio of
-//! the indices; elsewhere densities of both ways. Both ends know all of it when they meet: nobody needs to be
-//! traced back.
+//! for N light paths and kernels of radius r. ρ is 1 at a mirror, the squared ratio of the indices at a
+//! refraction, and a ratio of densities at other casters. Both paths know all factors when they meet, so
+//! neither is traced back.
 //!
-//! Weights are those of the power heuristic. For them p(xⱼ → x₍ⱼ₋₁₎) is that of a diffuse surface, cos θⱼ /
-//! π, whatever else x reflects, and r is that of the place of the photon, or of the point. So R = π² r² N
-//! ..., the weight of a photon is known when it is left, its power is multiplied with it, and a map needs no
-//! more than power. Photons that paths find more easily are hardly ever left. Ends of paths by roulette count
-//! for none of the densities.
+//! Weights follow the power heuristic. They use p(xⱼ → x₍ⱼ₋₁₎) of a diffuse surface, cos θⱼ / π, for any
+//! receiver, and the radius at the photon or the point. Then R = π² r² N ..., the weight of a photon is known
+//! when it is stored, its power is multiplied by the weight, and the map holds nothing but power. Photons
+//! that camera paths find more easily are rarely stored. No density includes Russian roulette.
 //!
-//! A diffuse surface under a narrow coat is two: its base is rough, its coat a link of the chain like rough
-//! metal. Paths and light paths choose one of them at each such surface
+//! A diffuse surface under a narrow coat counts as two: its base is a receiver, its coat a caster like rough
+//! metal. Camera and light paths choose one of them at each such surface
 //! (`docs/decisions/0069-coats-as-layers.md`).
 //!
-//! Beside an irradiance cache photons have less to do: a record knows all that something rough, be it metal,
-//! sent to a point, and photons only what came there straight from a mirror or smooth glass. A light path
-//! that meets two rough surfaces after each other ends, as its light is the record's. A path from the eye
-//! asks photons at each rough surface, but for those to which mirrors and glass lead from one whose photons
-//! know them.
+//! With an irradiance cache, records supply light that a rough surface, metal included, sent to a point.
+//! Photons supply light that came straight from a mirror or smooth glass. A light path that meets two rough
+//! surfaces in succession ends, because records supply its light. A camera path gathers photons at each
+//! receiver, except behind mirrors and glass at a receiver whose photons include that light.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
@@ -61,67 +58,66 @@ use crate::transport::walk::mis::{ChainLink, ratio_behind, weight_beside_merging
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// The least that the radius of a disc may be, times that of the disc from where something rough throws the
-/// light.
+/// Least radius of a kernel over the radius at the previous receiver.
 const SMALLEST: f32 = 0.5;
 
-/// Whether light is merged on a disc of `radius` that comes from a rough surface with discs of radius `from`,
-/// or, where that is zero, by mirrors and glass alone. If not, it is merged there, or still before.
+/// True if a kernel of `radius` merges light from a receiver with kernels of radius `from`; `from` is zero
+/// for light through casters alone. Otherwise a receiver closer to the light merges it.
 #[inline]
 pub(in crate::transport) fn is_wide_enough(radius: f32, from: f32) -> bool {
     radius >= SMALLEST * from
 }
 
-/// Photons of caustics as paths from the eye use them.
+/// Caustic photons that camera paths merge with.
 #[derive(Clone, Copy)]
 pub struct CausticMerging<'a> {
-    /// Of even and of odd samples.
+    /// Maps of even and of odd samples.
     maps: [&'a PhotonMap<'a>; 2],
     emission: &'a EmissionSampler<'a>,
-    discs: RadiusSchedule,
+    radii: RadiusSchedule,
     /// Light paths of each map.
     paths: f32,
-    /// Whether records have the light that something rough sent.
+    /// True if records supply light that rough surfaces sent.
     beside_records: bool,
 }
 
-/// What became of the one vertex of a path at which it can be merged with photons of caustics.
+/// State of the search for the merging vertex of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 struct Progress(u16);
 
 impl Progress {
-    /// It may be still to come.
+    /// The merging vertex may follow.
     const LATER: Self = Self(0);
-    /// It is behind the path.
+    /// The path has passed it.
     const DONE: Self = Self(1);
-    /// There is none: light was not merged where it might have been.
+    /// The path has none, because light was not merged where it could have been.
     const NEVER: Self = Self(2);
-    /// Photons at a surface before know the light straight from a mirror; of other light the vertex may be
-    /// still to come.
+    /// Photons at an earlier receiver include the light straight from a mirror. The merging vertex of other
+    /// light may follow.
     const KNOWN: Self = Self(3);
 
-    /// Whether it may be still to come.
+    /// True if the merging vertex may follow.
     #[inline]
     fn may_come(self) -> bool {
         self == Self::LATER || self == Self::KNOWN
     }
 }
 
-/// What merging adds to the state of a path.
+/// State of a path for merging.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct MergingState {
-    /// R of a path that came by specular surfaces from a rough one, except the factors of the light. Negative
-    /// on the way to the first specular surface; zero where photons could not find the path.
+    /// R of a path that came through casters from a receiver, without the factors of the light. Negative
+    /// before the first caster; zero if photons cannot sample the path.
     ratio: f32,
-    /// Kernel radius at the last rough surface; zero before the first.
+    /// Kernel radius at the last receiver; zero before the first.
     radius: f32,
-    /// 1 where the last vertex was a rough coat alone, which photons do not meet straight from a light.
+    /// 1 if the last vertex was a rough coat alone, which photons do not meet straight from a light.
     left_coat: u32,
-    /// Whether photons are still to be merged, behind the rough surfaces that the path has left,
+    /// Search before the current vertex.
     progress: Progress,
-    /// and with the vertex that it is about to leave.
+    /// Search after the current vertex.
     here: Progress,
 }
 
@@ -134,36 +130,39 @@ impl MergingState {
 }
 
 impl<'a> CausticMerging<'a> {
-    /// `maps` for even and odd samples, of `paths` light paths each, which were left for the same `discs`.
+    /// `maps` of even and odd samples from `paths` light paths each, whose photons were stored for the same
+    /// kernel `radii`.
     pub fn new(
         maps: [&'a PhotonMap<'a>; 2],
         emission: &'a EmissionSampler<'a>,
-        discs: RadiusSchedule,
+        radii: RadiusSchedule,
         paths: u32,
     ) -> Self {
-        Self { maps, emission, discs, paths: paths as f32, beside_records: false }
+        Self { maps, emission, radii, paths: paths as f32, beside_records: false }
     }
 
-    /// The same, where an irradiance cache may have the light that something rough sent to a point. Photons
-    /// are then of what comes straight from a mirror or smooth glass.
+    /// These photons with an irradiance cache, if `beside_records`: they then carry light straight from a
+    /// mirror or smooth glass.
     pub fn beside_records(self, beside_records: bool) -> Self {
         Self { beside_records, ..self }
     }
 
-    /// What becomes of the one vertex at which a path can be merged, where it meets the rough surface at
-    /// `position` in its segment number `segments`: `None` where photons are to be asked there. Beside
-    /// records they may know what comes straight from a mirror, and of that all that came to the surfaces
-    /// before it.
-    ///
-    /// Where depth `is_limited` that is the first surface alone, for photons do not know how far they are
-    /// from their light.
+    /// Search after the receiver at `position`, which segment number `segments` hits; `None` if it is the
+    /// merging vertex. If depth `is_limited`, only the first surface can be: photons do not store the length
+    /// of their paths.
     #[inline]
-    fn met(&self, state: &MergingState, position: Vec3, segments: u32, is_limited: bool) -> Option<Progress> {
+    fn progress_at(
+        &self,
+        state: &MergingState,
+        position: Vec3,
+        segments: u32,
+        is_limited: bool,
+    ) -> Option<Progress> {
         let is_first = state.radius == 0.0;
         let is_known = || {
             is_limited
                 || state.progress == Progress::KNOWN
-                || is_wide_enough(state.radius, self.discs.radius(position))
+                || is_wide_enough(state.radius, self.radii.radius(position))
         };
         if !is_first && (!self.beside_records || state.ratio > 0.0) && is_known() {
             return Some(if self.beside_records { Progress::KNOWN } else { Progress::DONE });
@@ -171,14 +170,14 @@ impl<'a> CausticMerging<'a> {
         (segments > 1 && is_limited).then_some(Progress::NEVER)
     }
 
-    /// Whether photons may come by `bsdf` to where a path has its `ratio` from.
+    /// True if photons may pass `bsdf` to the receiver at which `ratio` starts.
     #[inline]
     fn may_come_by(&self, bsdf: &Bsdf, ratio: f32) -> bool {
         !self.beside_records || ratio >= 0.0 || bsdf.is_delta()
     }
 
-    /// The `weight` of light that path tracing found, where photons might have found it as well: R is `ratio`
-    /// times the factors `of_light`.
+    /// MIS weight of light that the path tracer sampled with `weight` and photons can sample too: R is
+    /// `ratio` times the factors `of_light`.
     #[inline]
     fn beside_photons(&self, weight: f32, ratio: f32, of_light: impl FnOnce() -> f32) -> f32 {
         if ratio <= 0.0 || ratio.is_nan() {
@@ -187,8 +186,8 @@ impl<'a> CausticMerging<'a> {
         weight_beside_merging(weight, ratio * of_light())
     }
 
-    /// What `point` sends to `wo` of the light of photons around it, at the end of a path that has come so
-    /// far from the eye, or zero where something rough has thrown it on. `turns` turns the probes for walls.
+    /// Radiance towards `wo` from the photons around `point`. `travelled` is the length of the path from the
+    /// camera, or zero behind a receiver. `rotation` is that of the boundary rays, in turns.
     #[inline]
     fn reflected<F: Features>(
         &self,
@@ -196,7 +195,7 @@ impl<'a> CausticMerging<'a> {
         sample: u32,
         (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
-        turns: impl FnOnce() -> f32,
+        rotation: impl FnOnce() -> f32,
     ) -> RadianceEstimate {
         let map = self.maps[sample as usize & 1];
         if map.is_empty() || !bsdf.is_receiver() {
@@ -205,16 +204,16 @@ impl<'a> CausticMerging<'a> {
         let disc = QueryDisc {
             place: point.position,
             normal: point.geometric_normal,
-            radius: self.discs.radius_after(travelled, point.position),
+            radius: self.radii.radius_after(travelled, point.position),
             kernel: Kernel::Epanechnikov,
         };
-        // Most places have no photon near them, and need not look for walls.
+        // Most points have no photon in their kernel, and need no boundary rays.
         let density = map.gather(context.level, &disc, &Uniform(Rgb::ONE));
         if density.photons == 0 {
             return RadianceEstimate::default();
         }
         let light = Light { map, is_caustic: true, min_photons: f32::INFINITY };
-        reflected(light, context, (&disc, Some(density)), (point, bsdf), wo, turns())
+        reflected(light, context, (&disc, Some(density)), (point, bsdf), wo, rotation())
     }
 }
 
@@ -239,12 +238,12 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
         let PathVertex { point, ref bsdf, wo, segments, .. } = *vertex;
         state.here = state.progress;
         if state.progress.may_come() {
-            let met = self.met(state, point.position, segments, settings.is_limited());
-            state.here = met.unwrap_or(Progress::LATER);
-            if met.is_none() {
-                let turns = || vertex.sampler.single(dimension::PROBES + segments);
+            let progress = self.progress_at(state, point.position, segments, settings.is_limited());
+            state.here = progress.unwrap_or(Progress::LATER);
+            if progress.is_none() {
+                let rotation = || vertex.sampler.single(dimension::PROBES + segments);
                 let from = (wo, if state.radius == 0.0 { vertex.travelled } else { 0.0 });
-                let gathered = self.reflected(context, vertex.sample, (point, bsdf), from, turns);
+                let gathered = self.reflected(context, vertex.sample, (point, bsdf), from, rotation);
                 add(gathered.known(vertex));
             }
         }
@@ -303,18 +302,18 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
         let coat_alone = is_coat && !sample.delta && bsdf.gathers_photons_on_base(context.separates_coats());
         let is_rough = bsdf.is_receiver() && !sample.delta && !coat_alone;
         if is_rough {
-            (state.progress, state.radius) = (state.here, self.discs.radius(point.position));
+            (state.progress, state.radius) = (state.here, self.radii.radius(point.position));
         }
         state.left_coat = u32::from(coat_alone);
         state.ratio = match state.ratio {
             _ if is_rough && state.here != Progress::NEVER => {
-                -self.discs.merge_factor(point.position, self.paths)
+                -self.radii.merge_factor(point.position, self.paths)
             }
             _ if is_rough => 0.0,
             ratio if ratio == 0.0 || !self.may_come_by(bsdf, ratio) => 0.0,
             ratio => {
                 let link = ChainLink { point, bsdf, near: wo, far: sample.direction, coat_alone };
-                // Light paths know the usual probability of the coat, which both densities have to use.
+                // Light paths use the usual probability of the coat, so both densities do.
                 let pdf = match coat_alone {
                     true => bsdf.evaluate_apart::<F>(wo, sample.direction, 1.0)[1].1,
                     false => sample.pdf,
@@ -326,7 +325,7 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
 }
 
 impl<'a, F: Features, E: LightEstimator<F, State = ()>, R: Sharing> PathIntegrator<'a, F, E, R> {
-    /// The same, merged with photons of caustics.
+    /// This path tracer, merged with caustic photons.
     pub fn with_caustics(
         &self,
         merging: CausticMerging<'a>,

@@ -1,11 +1,11 @@
-//! Light paths for caustics: from the lights by mirrors and glass to the first rough surface, where a photon
-//! is left (Jensen 1996), weighted for the paths from the eye that it shares its light with (`merge.rs`).
+//! Light paths of caustic photons (Jensen 1996): from a light through casters to the first receiver, where a
+//! photon is stored with its MIS weight against camera paths (`merge.rs`).
 //!
-//! From there paths go on in whatever way, and leave a photon on each rough surface, so that paths from the
-//! eye need not find the caustic by chance. A path that meets a rough surface first goes on by what a smooth
-//! coat mirrors there alone. Beside the records of an irradiance cache a photon is left only by what comes
-//! straight from a mirror or smooth glass: records have all that something rough sent. How paths go is in
-//! `walk/light.rs`.
+//! A light path continues from the first receiver in any way and stores a photon at each later receiver, so
+//! that camera paths need not meet the caustic by chance. A path whose first surface is a receiver continues
+//! only by the reflection of a smooth coat. With the records of an irradiance cache, only light straight from
+//! a mirror or smooth glass is stored, because records supply all light that rough surfaces sent.
+//! `walk/light.rs` has the walk.
 
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
@@ -27,88 +27,89 @@ use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
 use glam::{Vec2, Vec3};
 
-/// Photons that a task has room for: a path leaves two on average at most.
+/// Capacity of a task in photons; a path stores at most two on average.
 pub const PHOTONS_PER_TASK: usize = 3 * PATHS_PER_TASK;
 
-/// Probability with which a path goes on, at most, where it leaves a photon.
-const MOST: f32 = 0.5;
+/// Maximum continuation probability of a path at a photon.
+const MAX_CONTINUATION: f32 = 0.5;
 
-/// Photons of less weight than this are left so much less often, with this weight: paths find their light.
-const LEAST_WEIGHT: f32 = 0.1;
+/// Photons of less weight undergo Russian roulette and get this weight, because paths find their light.
+const MIN_WEIGHT: f32 = 0.1;
 
-/// What light outside of the picture, or hidden from the eye, counts: some of it comes back.
+/// Benefit of a photon that the camera does not see, relative to a visible one: some of its light comes back.
 const INDIRECT: f32 = 0.02;
 
-/// What a surface is thought to reflect.
+/// Assumed albedo of receivers.
 const REFLECTED: f32 = 0.5;
 
-/// Surfaces of glass between the eye and what it sees, at most, and how far from both ends it is looked for
-/// them, in shares of the distance.
-const MOST_GLASS: u32 = 16;
+/// Maximum number of glass surfaces between the camera and a visible photon.
+const MAX_GLASS: u32 = 16;
+
+/// Parts at both ends of the segment to the camera that the visibility test skips, relative to its length.
 const NEAR: f32 = 1e-4;
 
-/// Shoots photons of caustics: a pass of tasks of [`PATHS_PER_TASK`] paths.
+/// Tracer of caustic photons: a pass whose tasks trace [`PATHS_PER_TASK`] light paths each.
 #[derive(Clone, Copy)]
 pub struct CausticPhotonTracer<'a, F> {
-    flight: LightWalk<'a, F>,
-    discs: RadiusSchedule,
+    walk: LightWalk<'a, F>,
+    radii: RadiusSchedule,
     /// Pixels across and down.
     frame: [u32; 2],
     beside_records: bool,
 }
 
-/// What became of a light path: what its photons are worth, and from which cell of the guide it came.
+/// Light path as a sample of the emission guide: its cell, and the benefit of its photons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct GuideSample {
-    /// Its cell.
+    /// Cell of the guide.
     pub cell: u32,
-    /// Zero where nothing was left.
-    pub worth: f32,
-    /// The block of the picture, of [`BLOCKS`] across and down, where it shows, and
+    /// Benefit of its photons; zero if none was stored.
+    pub benefit: f32,
+    /// Block of the picture in which its last photon is visible, of [`BLOCKS`] across and down.
     pub block: u32,
-    /// the radiance that its photons bring to each pixel of their disc, of that which paths find badly;
+    /// Radiance that its photons add to each pixel of their kernels, of light that path tracing rarely finds.
     pub light: f32,
-    /// how often a sample of each of these pixels finds it, if paths alone are to, and
+    /// Expected number of hits of this light per path-traced sample of such a pixel.
     pub hits: f32,
-    /// the radiance that a sample has then; infinite where none does.
+    /// Radiance of such a sample; infinite if path tracing cannot find the light.
     pub flash: f32,
 }
 
-/// Blocks of the picture, across and down, that tell where caustics are.
+/// Blocks of the picture across and down, by which caustics are located.
 pub const BLOCKS: u32 = 16;
 
 impl<'a, F: Features> CausticPhotonTracer<'a, F> {
-    /// A shooter over frozen structures, for photons that will be gathered from `discs` in a picture of so
-    /// many pixels across and down. `F` has at least the features of the scene. All photons are kept,
-    /// whatever `settings` say.
+    /// A tracer over frozen structures, for photons that are gathered with kernel `radii` in a picture of
+    /// `frame` pixels across and down. `F` has at least the features of the scene. The photon filter of
+    /// `settings` is ignored.
     pub fn new(
         (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a LightSampler<'a>),
         emission: &'a EmissionSampler<'a>,
         settings: PhotonTracerSettings,
-        (discs, frame): (RadiusSchedule, [u32; 2]),
+        (radii, frame): (RadiusSchedule, [u32; 2]),
         level: Level,
     ) -> Self {
         let PhotonTracerSettings { seed, paths, max_depth, .. } = settings;
         let context = SceneContext::new(scene, bvh, lights, level);
-        let flight = LightWalk { context, emission, seed, paths, max_depth };
-        Self { flight, discs, frame, beside_records: false }
+        let walk = LightWalk { context, emission, seed, paths, max_depth };
+        Self { walk, radii, frame, beside_records: false }
     }
 
-    /// The same, of photons for
-    /// [`CausticMerging::beside_records`](crate::transport::CausticMerging::beside_records), if so.
+    /// This tracer for photons of
+    /// [`CausticMerging::beside_records`](crate::transport::CausticMerging::beside_records).
     pub fn beside_records(self, beside_records: bool) -> Self {
         Self { beside_records, ..self }
     }
 
     /// Light paths of a map.
     pub fn paths(&self) -> u32 {
-        self.flight.paths
+        self.walk.paths
     }
 
     /// Number of tasks of a map.
     pub fn tasks(&self) -> usize {
-        self.flight.tasks()
+        self.walk.tasks()
     }
 
     /// Working memory of one task.
@@ -116,8 +117,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         LightWalk::<F>::scratch()
     }
 
-    /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is
-    /// not needed, with photons of no place, which a map refuses. Room for [`PHOTONS_PER_TASK`] is enough.
+    /// Traces the photons of task `task` of map number `map` (below 2^31). Unused elements of `out` get
+    /// photons without a position, which a map rejects. A length of [`PHOTONS_PER_TASK`] suffices.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`CausticPhotonTracer::scratch`] bytes.
@@ -128,24 +129,24 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut pile = PhotonBuffer::new(out);
-        let leave = |_: &LightPathState, photon, _, counters: &mut Counters| pile.push(photon, counters);
-        let counters = self.flight.follow(
+        let mut buffer = PhotonBuffer::new(out);
+        let store = |_: &LightPathState, photon, _, counters: &mut Counters| buffer.push(photon, counters);
+        let counters = self.walk.follow(
             task,
             map,
             scratch,
-            &mut MisDepositor { shooter: self, leave, goes_on: true },
+            &mut MisDepositor { tracer: self, store, continues: true },
         )?;
-        pile.finish();
+        buffer.finish();
         Ok(counters)
     }
 
-    /// Shoots the same photons to see where those are from that show in the picture. `out` gets one for each
-    /// path, up to [`PATHS_PER_TASK`].
+    /// Traces the same light paths without storing photons. `out` gets a sample of the guide for each path,
+    /// up to [`PATHS_PER_TASK`].
     ///
     /// # Errors
     /// As [`CausticPhotonTracer::run`].
-    pub fn look(
+    pub fn sample_guide(
         &self,
         task: usize,
         map: u32,
@@ -154,42 +155,41 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     ) -> Result<Counters, OutOfMemory> {
         let first = (task * PATHS_PER_TASK) as u32;
         out.fill(GuideSample::default());
-        let leave = |state: &LightPathState, photon: Photon, share: CausticShare, _: &mut Counters| {
-            if let Some(find) = out.get_mut((state.number - first) as usize) {
-                let place = photon.position();
+        let store = |state: &LightPathState, photon: Photon, weight: PhotonWeight, _: &mut Counters| {
+            if let Some(sample) = out.get_mut((state.number - first) as usize) {
+                let position = photon.position();
                 let power = luminance(photon.power());
-                let radius = self.discs.radius(place);
+                let radius = self.radii.radius(position);
                 let pixels = 1.0 / (radius * radius);
-                find.cell = state.cell;
-                let Some(block) = self.block(place) else {
-                    find.worth += power * pixels * INDIRECT;
+                sample.cell = state.cell;
+                let Some(block) = self.block(position) else {
+                    sample.benefit += power * pixels * INDIRECT;
                     return;
                 };
-                find.worth += power * pixels;
-                find.block = block;
+                sample.benefit += power * pixels;
+                sample.block = block;
                 let light = REFLECTED / PI * power * pixels / PI;
-                let whole = light * share.chance / share.weight;
-                find.light += light;
-                (find.hits, find.flash) = (share.ratio / share.chance, whole / share.ratio);
+                let whole = light * weight.probability / weight.weight;
+                sample.light += light;
+                (sample.hits, sample.flash) = (weight.ratio / weight.probability, whole / weight.ratio);
             }
         };
-        self.flight.follow(task, map, scratch, &mut MisDepositor { shooter: self, leave, goes_on: false })
+        self.walk.follow(task, map, scratch, &mut MisDepositor { tracer: self, store, continues: false })
     }
 
-    /// In which block of the picture light at `place` shows, straight or through glass; `None` where it is
-    /// outside, or hidden from the eye: some of it comes back.
-    fn block(&self, place: Vec3) -> Option<u32> {
-        let context = &self.flight.context;
+    /// Block of the picture in which the camera sees `position`, directly or through glass; `None` if it does
+    /// not.
+    fn block(&self, position: Vec3) -> Option<u32> {
+        let context = &self.walk.context;
         let camera = &context.scene.camera;
         let [width, height] = self.frame;
-        let at = camera.project(width, height, place, [0.5; 2])?.raster;
+        let at = camera.project(width, height, position, [0.5; 2])?.raster;
         let frame = Vec2::new(width as f32, height as f32);
         if at.cmplt(Vec2::ZERO).any() || at.cmpge(frame).any() {
             return None;
         }
-        // What is seen through glass is seen.
-        let to_eye = camera.eye - place;
-        let mut ray = Ray::segment(place + NEAR * to_eye, (1.0 - NEAR) * to_eye, 1.0);
+        let to_eye = camera.eye - position;
+        let mut ray = Ray::segment(position + NEAR * to_eye, (1.0 - NEAR) * to_eye, 1.0);
         let mut crossed = 0;
         loop {
             let hit = context.nearest(&ray);
@@ -198,27 +198,27 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
                 return Some((y as u32).min(BLOCKS - 1) * BLOCKS + (x as u32).min(BLOCKS - 1));
             };
             crossed += 1;
-            if crossed > MOST_GLASS || !point.material.may_pass_caustics() {
+            if crossed > MAX_GLASS || !point.material.may_pass_caustics() {
                 return None;
             }
             ray = point.spawn_to(camera.eye);
         }
     }
 
-    /// The share that photons have in the light of this path at `place`.
-    fn share(&self, state: &LightPathState, place: Vec3) -> CausticShare {
+    /// MIS weight of a photon of this path at `position`.
+    fn weight(&self, state: &LightPathState, position: Vec3) -> PhotonWeight {
         let ratio =
-            state.path_pdfs / (self.discs.merge_factor(place, self.flight.paths as f32) * state.chain_ratio);
+            state.path_pdfs / (self.radii.merge_factor(position, self.walk.paths as f32) * state.chain_ratio);
         let weight = merging_weight(ratio);
-        // Zero over zero: without any other technique photons have it all.
+        // Zero over zero: without any other technique the weight is one.
         let weight = if state.path_pdfs == 0.0 { 1.0 } else { weight };
-        CausticShare { weight, chance: (weight / LEAST_WEIGHT).min(1.0), ratio }
+        PhotonWeight { weight, probability: (weight / MIN_WEIGHT).min(1.0), ratio }
     }
 
-    /// `chain` and `others` before the first surface: `back` is the density of the direction to the light,
-    /// where it is not the only one.
+    /// `chain_ratio` and `path_pdfs` before the first surface. `back` is the pdf of the direction to the
+    /// light; `None` after a specular scattering.
     fn first(&self, state: &LightPathState, vertex: &Vertex, back: Option<f32>) -> (f32, f32) {
-        let LightWalk { context: SceneContext { scene, lights, .. }, emission, .. } = self.flight;
+        let LightWalk { context: SceneContext { scene, lights, .. }, emission, .. } = self.walk;
         let &Vertex { point, bsdf, to_light, .. } = vertex;
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
         let position = point.position;
@@ -253,58 +253,58 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     }
 }
 
-/// What is known of a photon beside its power.
+/// MIS weight of a photon, and its Russian roulette.
 #[derive(Clone, Copy)]
-struct CausticShare {
-    /// In the light of its path.
+struct PhotonWeight {
+    /// MIS weight against camera paths.
     weight: f32,
-    /// With which it is left at all.
-    chance: f32,
-    /// How densely paths from the eye find its light, over how densely photons do.
+    /// Probability that it is stored.
+    probability: f32,
+    /// Density of camera paths over that of photons.
     ratio: f32,
 }
 
-impl CausticShare {
-    /// Of a photon that has its weight already.
-    const ALL: CausticShare = CausticShare { weight: 1.0, chance: 1.0, ratio: 0.0 };
+impl PhotonWeight {
+    /// Weight of a photon whose power includes it already.
+    const ONE: PhotonWeight = PhotonWeight { weight: 1.0, probability: 1.0, ratio: 0.0 };
 
-    /// What is left of the power of a path with a photon at `vertex`; `None` where that is not left.
-    fn kept(&self, vertex: &Vertex) -> Option<f32> {
-        (vertex.visitor_number() < self.chance).then(|| self.weight / self.chance)
+    /// Factor on the power of the photon at `vertex`; `None` if roulette rejects it.
+    fn factor(&self, vertex: &Vertex) -> Option<f32> {
+        (vertex.visitor_number() < self.probability).then(|| self.weight / self.probability)
     }
 }
 
-/// `LightPathState::path_pdfs` of a path that a rough surface has scattered: its power has its weight, and
-/// `LightPathState::chain_ratio` is the radius of discs at the last.
+/// `LightPathState::path_pdfs` of a path behind a receiver: its power includes its weight, and
+/// `LightPathState::chain_ratio` is the kernel radius at the last receiver.
 const SCATTERED: f32 = -1.0;
 
-/// Leaves photons with their weights.
+/// Visitor that stores photons with their weights.
 struct MisDepositor<'s, 'a, F, L> {
-    shooter: &'s CausticPhotonTracer<'a, F>,
-    leave: L,
-    /// Whether paths go on from the first rough surface.
-    goes_on: bool,
+    tracer: &'s CausticPhotonTracer<'a, F>,
+    store: L,
+    /// True if paths continue from the first receiver.
+    continues: bool,
 }
 
 impl<F: Features, L> MisDepositor<'_, '_, F, L> {
-    /// Whether light is gathered at `vertex`, which is rough, and not where it was scattered last.
+    /// True if light is merged at the receiver `vertex`, not at the receiver before it.
     fn is_merged(&self, state: &LightPathState, vertex: &Vertex) -> bool {
-        let LightWalk { max_depth, .. } = self.shooter.flight;
+        let LightWalk { max_depth, .. } = self.tracer.walk;
         let from =
             if state.path_pdfs == SCATTERED && max_depth == UNLIMITED { state.chain_ratio } else { 0.0 };
-        is_wide_enough(self.shooter.discs.radius(vertex.point.position), from)
+        is_wide_enough(self.tracer.radii.radius(vertex.point.position), from)
     }
 
-    /// What is known of a photon at `vertex`, which is rough.
-    fn share(&self, state: &LightPathState, vertex: &Vertex) -> CausticShare {
+    /// Weight of a photon at the receiver `vertex`.
+    fn weight(&self, state: &LightPathState, vertex: &Vertex) -> PhotonWeight {
         match state.path_pdfs {
-            SCATTERED => CausticShare::ALL,
-            _ => self.shooter.share(state, vertex.point.position),
+            SCATTERED => PhotonWeight::ONE,
+            _ => self.tracer.weight(state, vertex.point.position),
         }
     }
 }
 
-impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)> Visitor
+impl<F: Features, L: FnMut(&LightPathState, Photon, PhotonWeight, &mut Counters)> Visitor
     for MisDepositor<'_, '_, F, L>
 {
     const DIMENSIONS: u32 = 4;
@@ -317,30 +317,28 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         vertex: &Vertex,
         counters: &mut Counters,
     ) -> Option<Continuation> {
-        let ends = vertex.bsdf.is_receiver();
-        let is_known = self.shooter.beside_records && state.from_caster == 0;
-        let leaves = ends && state.segments > 1 && !is_known;
-        if leaves && self.is_merged(state, vertex) {
-            let share = self.share(state, vertex);
-            if let Some(kept) = share.kept(vertex) {
-                (self.leave)(state, vertex.photon(Rgb::from(state.power) * kept), share, counters);
+        let is_receiver = vertex.bsdf.is_receiver();
+        let is_known = self.tracer.beside_records && state.from_caster == 0;
+        let has_photon = is_receiver && state.segments > 1 && !is_known;
+        if has_photon && self.is_merged(state, vertex) {
+            let weight = self.weight(state, vertex);
+            if let Some(factor) = weight.factor(vertex) {
+                (self.store)(state, vertex.photon(Rgb::from(state.power) * factor), weight, counters);
             }
         }
         Some(Continuation {
-            most: if leaves { MOST } else { 1.0 },
-            specular_only: ends && !(leaves && self.goes_on),
+            most: if has_photon { MAX_CONTINUATION } else { 1.0 },
+            specular_only: is_receiver && !(has_photon && self.continues),
         })
     }
 
-    /// Straight from a light no photon goes on by a rough coat: paths find that light.
+    /// Photons straight from a light are not scattered by a rough coat: path tracing finds that light.
     #[inline]
     fn is_apart(&self, state: &LightPathState, vertex: &Vertex) -> bool {
-        state.segments > 1
-            && vertex.bsdf.gathers_photons_on_base(self.shooter.flight.context.separates_coats())
+        state.segments > 1 && vertex.bsdf.gathers_photons_on_base(self.tracer.walk.context.separates_coats())
     }
 
-    /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how
-    /// the path tracer finds its light.
+    /// Multiplies `chain_ratio` by the ρ of a caster; sets it and `path_pdfs` at the first vertex.
     #[inline]
     fn leave(
         &self,
@@ -352,24 +350,24 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         state.from_caster = vertex.bsdf.is_delta().into();
         if vertex.bsdf.is_receiver() && !is_specular {
             if state.path_pdfs != SCATTERED {
-                // What goes on is what was left.
-                let kept = self.share(state, vertex).kept(vertex).unwrap_or(0.0);
-                state.power = (Rgb::from(state.power) * kept).to_array();
+                // The path continues with the power of its photon.
+                let factor = self.weight(state, vertex).factor(vertex).unwrap_or(0.0);
+                state.power = (Rgb::from(state.power) * factor).to_array();
             }
             (state.path_pdfs, state.chain_ratio) =
-                (SCATTERED, self.shooter.discs.radius(vertex.point.position));
+                (SCATTERED, self.tracer.radii.radius(vertex.point.position));
         }
         if state.path_pdfs == SCATTERED {
             return;
         }
-        // The way back, as the path tracer goes it.
+        // The reverse direction, in which the path tracer samples.
         let Vertex { point, bsdf, .. } = *vertex;
         let coat_alone = is_specular && !sample.delta;
         let there = ChainLink { point, bsdf, near: from, far: sample.direction, coat_alone };
-        let back = if sample.delta { 1.0 } else { there.pdf(&self.shooter.flight.context) };
+        let back = if sample.delta { 1.0 } else { there.pdf(&self.tracer.walk.context) };
         if state.segments == 1 {
             let back = (!sample.delta).then_some(back);
-            (state.chain_ratio, state.path_pdfs) = self.shooter.first(state, vertex, back);
+            (state.chain_ratio, state.path_pdfs) = self.tracer.first(state, vertex, back);
         }
         state.chain_ratio *= if sample.delta {
             sample.eta * sample.eta
