@@ -58,7 +58,7 @@ impl Clearance {
 
 /// Visitor of the triangles in a box.
 pub(crate) trait BoxVisitor {
-    /// Whether the triangles in a node, whose box is from the first to the second of its `corners`, matter.
+    /// True if the triangles in a node, whose box is from the first to the second of its `corners`, matter.
     #[inline]
     fn enters(&self, _corners: &impl Fn() -> [Vec3; 2]) -> bool {
         true

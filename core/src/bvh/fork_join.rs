@@ -5,7 +5,7 @@ pub trait ForkJoin: Sync {
     /// Runs both and returns when both are done.
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send);
 
-    /// Whether builds should end early. The result of a build during which this becomes true is of no use.
+    /// True if builds should end early. The result of a build during which this becomes true is of no use.
     fn is_over(&self) -> bool {
         false
     }

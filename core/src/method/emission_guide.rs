@@ -40,13 +40,13 @@ pub struct GuideSettings {
     pub filter: PhotonFilter,
     /// The largest number of segments of a path.
     pub max_depth: u32,
-    /// Where photons are used.
+    /// Points at which photons are gathered.
     pub target: Target,
     /// Bytes that have to stay free; with less, lights are chosen by power.
     pub reserve: usize,
 }
 
-/// Where photons are used.
+/// Points at which photons are gathered.
 #[derive(Clone, Copy)]
 pub enum Target {
     /// At visible points, in discs of this radius in pixels.

@@ -20,7 +20,7 @@ impl<'w> Worker<'w> {
         Self { scratch, is_over }
     }
 
-    /// Whether the task should end at the next point where its piece is in order.
+    /// True if the task should end at the next point where its piece is in order.
     pub fn is_over(&self) -> bool {
         (self.is_over)()
     }
@@ -32,7 +32,7 @@ impl<'w> Worker<'w> {
 pub struct Passed {
     /// Sums over the tasks that ran.
     pub counters: Counters,
-    /// Whether all tasks ran. Otherwise nothing of the pass may be used.
+    /// True if all tasks ran. Otherwise nothing of the pass may be used.
     pub is_complete: bool,
 }
 
@@ -64,7 +64,7 @@ pub trait Executor {
         self.pass(pieces, task)
     }
 
-    /// Whether passes are to end: a deadline has passed, or the user has interrupted the render.
+    /// True if passes are to end: a deadline has passed, or the user has interrupted the render.
     fn is_over(&self) -> bool;
 
     /// Forks, for builds that divide themselves.

@@ -45,7 +45,7 @@ const PILOT: u32 = 1 << 30;
 /// One of this number of tiles is rendered twice, to estimate the light that the bound cuts.
 const TILES_PER_ESTIMATE: usize = 16;
 
-/// How virtual lights are used.
+/// Sample counts of virtual lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VirtualLightSettings {
     /// Light paths for each sample of the picture, in sets of 1024; `None`: a sixteenth of the pixels.
@@ -224,7 +224,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         !self.cut.is_empty()
     }
 
-    /// Whether neighbouring pixels reuse paths, and why.
+    /// Use of path reuse, and its pilot.
     pub fn reuse(&self) -> Reuse {
         self.paths.reuse()
     }

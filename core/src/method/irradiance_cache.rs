@@ -30,7 +30,7 @@ const TIME: f32 = 0.25;
 /// Strata along a side behind rough surfaces are half as many, in multiples of this.
 const BLOCK: usize = 8;
 
-/// How caches are made.
+/// Settings of both caches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CacheSettings {
     /// The rule of the validity radii.
@@ -43,7 +43,7 @@ pub struct CacheSettings {
     pub fewest: usize,
     /// Bytes that are to stay available.
     pub reserve: usize,
-    /// Whether records become wider where there was no time to fill the caches.
+    /// True if records become wider where there was no time to fill the caches.
     pub widens: bool,
 }
 
@@ -147,12 +147,12 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         self.builders.each_ref().map(CacheBuilder::gathered)
     }
 
-    /// Whether both are frozen.
+    /// True if both are frozen.
     pub fn is_frozen(&self) -> bool {
         self.is_frozen
     }
 
-    /// Whether there was no time to fill them.
+    /// True if there was no time to fill them.
     pub fn is_cut(&self) -> bool {
         self.is_cut
     }
@@ -167,7 +167,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         self.integrator.with_caches(self.caches())
     }
 
-    /// Whether cache `number` is as it will be.
+    /// True if cache `number` is as it will be.
     pub fn is_filled(&self, number: usize) -> bool {
         self.builders.get(number).is_none_or(CacheBuilder::is_finished)
     }

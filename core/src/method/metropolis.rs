@@ -126,7 +126,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
         Paths::new(context.scene_context(), emission, context.settings, *split)
     }
 
-    /// Whether there is light that chains could find, and time for them.
+    /// True if there is light that chains could find, and time for them.
     fn is_needed(&self) -> bool {
         let Self { context, lengths, plan, .. } = self;
         plan.chains > 0 && !context.lights.is_empty() && context.settings.max_depth >= lengths.first()

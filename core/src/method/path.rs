@@ -9,7 +9,7 @@ use crate::findings::{Finding, Findings, Value};
 use crate::memory::{Footprint, OutOfMemory};
 use crate::transport::{PathIntegrator, PathReuse, Pilot, path::WAVE};
 
-/// Whether neighbouring pixels reuse paths.
+/// Use of path reuse among neighbouring pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reuse {
     /// They do.
@@ -89,7 +89,7 @@ impl<'a, F: Features> PathTracing<'a, F> {
         self.reuse.used.then(|| self.integrator.with_reuse().with_firefly_limit(mean))
     }
 
-    /// Whether pixels reuse paths, and why.
+    /// Use of path reuse, and its pilot.
     pub fn reuse(&self) -> Reuse {
         self.reuse
     }

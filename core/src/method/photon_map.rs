@@ -151,7 +151,7 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
             asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS_PER_TASK).max(1))
         };
         let wanted = [tasks(settings.global), if has_caustics { tasks(settings.caustic) } else { 0 }];
-        // Where memory is short, both get the same fraction of what they want.
+        // If memory is short, both maps get the same fraction of their footprints.
         let available = memory.available().saturating_sub(reserve) / 2;
         let share = (available as f64 / Maps::footprint(wanted[0], wanted[1]).bytes() as f64).min(1.0);
         let [global, caustic] =

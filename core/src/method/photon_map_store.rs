@@ -92,9 +92,9 @@ impl<'m> PhotonMapStore<'m> {
 /// Maps of the even and of the odd samples, which have nothing in common: the halves of the film stay
 /// independent.
 pub struct PhotonMapPair<'m> {
-    /// Of even samples.
+    /// Map of even samples.
     pub even: PhotonMapStore<'m>,
-    /// Of odd samples.
+    /// Map of odd samples.
     pub odd: PhotonMapStore<'m>,
 }
 

@@ -45,7 +45,7 @@ const NEARLY_ALL: f64 = 0.98;
 pub struct CacheBuilder<'m> {
     /// Its records so far.
     pub cache: IrradianceCache<'m>,
-    /// Which of independent caches: each looks at other samples of the pixels and gathers with other rays.
+    /// Number of the cache among independent ones, whose pixel samples and gather rays differ.
     index: u32,
     /// The points that this sweep looks for; `None` at the end.
     via: Option<Via>,
@@ -70,7 +70,7 @@ impl<'m> CacheBuilder<'m> {
         IrradianceCache::footprint(capacity).slice::<f32>(capacity).slice::<GatherPoint>(capacity)
     }
 
-    /// How many records fit into `bytes`.
+    /// Number of records that fit into `bytes`.
     pub fn capacity_of(bytes: usize) -> usize {
         let mut capacity = IrradianceCache::capacity_of(bytes);
         while capacity > 0 && Self::footprint(capacity).bytes() > bytes {
@@ -123,7 +123,7 @@ impl<'m> CacheBuilder<'m> {
         self.via = None;
     }
 
-    /// Whether no record will be added.
+    /// True if no record will be added.
     pub fn is_finished(&self) -> bool {
         self.via.is_none() || self.cache.is_full()
     }
@@ -172,7 +172,7 @@ impl<'m> CacheBuilder<'m> {
         cache.retain(is_kept);
     }
 
-    /// Whether nothing is to be gathered at `point`, for records of at least `least_pixels` pixels.
+    /// True if nothing is to be gathered at `point`, for records of at least `least_pixels` pixels.
     fn is_served(&self, point: &GatherPoint, least_pixels: f32) -> bool {
         self.cache.is_full() || point.is_confined(least_pixels) || self.cache.covers(&point.query())
     }
@@ -222,7 +222,7 @@ pub struct RecordPlacement<'p, 'a, F> {
     /// Tables of the strata of records that are seen, and of those behind rough surfaces, of which a pixel
     /// sees the mean.
     pub flux: [&'p CellFlux<'p>; 2],
-    /// How far records are valid.
+    /// Error metric, which sets the validity radii.
     pub metric: metric::Settings,
     /// Least radius of a record, in pixels.
     pub least_pixels: f32,

@@ -20,7 +20,7 @@ impl Shard {
     /// The whole picture.
     pub const WHOLE: Shard = Shard { index: 0, count: 1 };
 
-    /// Whether `tile` belongs to it.
+    /// True if `tile` belongs to it.
     pub fn owns(&self, tile: usize) -> bool {
         tile % self.count.max(1) as usize == self.index as usize
     }
@@ -38,7 +38,7 @@ pub struct RenderState<'m> {
     pub shard: Shard,
     /// Sums over all tasks.
     pub counters: Counters,
-    /// Whether errors of distant pixels are correlated, because a structure such as a cache serves them all.
+    /// True if errors of distant pixels are correlated, because a structure such as a cache serves them all.
     pub is_correlated: bool,
 }
 

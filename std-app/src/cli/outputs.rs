@@ -62,7 +62,7 @@ pub(super) struct Outputs {
     start: Instant,
     planned: Vec<Output>,
     is_json: bool,
-    /// Whether a file is standard output, so that the summary goes to standard error.
+    /// True if a file is standard output, so that the summary goes to standard error.
     has_stdout: bool,
     failures: Vec<Failure>,
 }

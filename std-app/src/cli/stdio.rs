@@ -24,7 +24,7 @@ pub(super) fn check_output(written: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
-/// Whether the pipe or the terminal is closed.
+/// True if the pipe or the terminal is closed.
 fn is_closed(error: &io::Error) -> bool {
     /// EIO: a closed terminal, or a file on a broken disk.
     const INPUT_OUTPUT: i32 = 5;

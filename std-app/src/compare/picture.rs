@@ -18,7 +18,7 @@ pub enum Shown {
 }
 
 impl Shown {
-    /// Whether values may be negative.
+    /// True if values may be negative.
     pub fn is_signed(self) -> bool {
         matches!(self, Shown::Signed | Shown::Relative)
     }

@@ -84,7 +84,7 @@ impl Lamp {
         [self.normal.x, self.normal.y, self.normal.z, distance].map(|x| (x * 1024.0).round() as i64)
     }
 
-    /// Whether the centre of `other`, in the same plane, lies inside.
+    /// True if the centre of `other`, in the same plane, lies inside.
     fn covers(&self, other: &Lamp) -> bool {
         let [a, b, c] = self.corners;
         let centre = (other.corners[0] + other.corners[1] + other.corners[2]) / 3.0;

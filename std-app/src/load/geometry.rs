@@ -180,7 +180,7 @@ impl<'a> Builder<'a> {
         (self.geometry, self.notes)
     }
 
-    /// Whether a triangle is finite and has an area; notes doubtful ones.
+    /// True if a triangle is finite and has an area; notes doubtful ones.
     fn is_usable(&mut self, vertices: [u32; 3], corners: [DVec3; 3]) -> bool {
         let [p, q, r] = corners;
         let area = (q - p).cross(r - p);

@@ -9,7 +9,7 @@ pub(super) const DARK_BASE: f64 = 0.02;
 /// Difference of `Ni` and 1 up to which no ray is refracted.
 const INDEX_TOLERANCE: f64 = 1e-3;
 
-/// Whether the material is a dielectric by its `illum`. Exceptions: metals; `Ni 1`, which exporters write for
+/// True if the material is a dielectric by its `illum`. Exceptions: metals; `Ni 1`, which exporters write for
 /// opaque materials; `illum 9` with a `d`, which means opacity; `illum 4` and `9` with a `Kd` but no `Ni` and
 /// `Tf`.
 pub(super) fn is_glass(mtl: &MtlMaterial) -> bool {
@@ -28,7 +28,7 @@ pub(super) fn is_glass(mtl: &MtlMaterial) -> bool {
     }
 }
 
-/// Whether the diffuse base is visible.
+/// True if the diffuse base is visible.
 fn has_base(mtl: &MtlMaterial) -> bool {
     mtl.has_map(MapKind::Diffuse) || mtl.diffuse.is_some_and(|kd| kd.iter().any(|&x| x > DARK_BASE))
 }
@@ -38,7 +38,7 @@ pub(super) fn index(mtl: &MtlMaterial) -> Option<f64> {
     mtl.ior.filter(|ior| (0.001..=100.0).contains(ior))
 }
 
-/// Whether `Pr`, `Pm` or one of their maps specifies the surface.
+/// True if `Pr`, `Pm` or one of their maps specifies the surface.
 pub(super) fn is_pbr(mtl: &MtlMaterial) -> bool {
     mtl.roughness.is_some() || mtl.has_map(MapKind::Roughness) || is_metal(mtl)
 }

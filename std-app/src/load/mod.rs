@@ -55,7 +55,7 @@ use texcoords::Texcoords;
 /// Options of a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Whether to decode textures; without them, materials have their constant values.
+    /// True if to decode textures; without them, materials have their constant values.
     pub textures: bool,
     /// Memory limit in bytes, temporary memory included; `None`: 80 % of the machine's memory.
     pub memory: Option<usize>,

@@ -67,7 +67,7 @@ impl MtlMaterial {
         self.maps.get(&kind)
     }
 
-    /// Whether there is a map of a kind.
+    /// True if there is a map of a kind.
     pub fn has_map(&self, kind: MapKind) -> bool {
         self.maps.contains_key(&kind)
     }

@@ -47,7 +47,7 @@ pub(super) fn count(corners: [DVec3; 3]) -> f64 {
     (0..3).map(|axis| 1.0 + planes(low[axis], high[axis]).count() as f64).product()
 }
 
-/// Whether this many pieces of a scene are cut.
+/// True if this many pieces of a scene are cut.
 pub(super) fn is_affordable(pieces: f64) -> bool {
     pieces <= MOST
 }

@@ -73,7 +73,7 @@ impl Resolver<'_> {
         Surface::Conductor { reflectance, roughness: self.roughness() }
     }
 
-    /// Whether `illum 3` or `5` is a pure reflection: by `Ks` over a dark base, or by `Kd` without `Ks`.
+    /// True if `illum 3` or `5` is a pure reflection: by `Ks` over a dark base, or by `Kd` without `Ks`.
     fn is_mirror(&mut self, base: &ColorInput) -> bool {
         let Some(model @ (3 | 5)) = self.mtl.illumination else { return false };
         let is_dark = base.texture.is_none() && f64::from(base.value.max_element()) <= DARK_BASE;
@@ -128,7 +128,7 @@ impl Resolver<'_> {
         (matches!(self.mtl.illumination, Some(2 | 3 | 5)) && expected > 0.0 && agrees).then_some(ior as f32)
     }
 
-    /// Whether `Ks` counts: `illum 0` and `1` have no highlight without `Pr` or `Pm`.
+    /// True if `Ks` counts: `illum 0` and `1` have no highlight without `Pr` or `Pm`.
     fn has_specular(&self) -> bool {
         let mtl = self.mtl;
         let is_matt = matches!(mtl.illumination, Some(0 | 1)) && !is_pbr(mtl);

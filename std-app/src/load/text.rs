@@ -64,7 +64,7 @@ fn join_continued_lines(bytes: &mut [u8]) {
     }
 }
 
-/// Whether a byte separates words.
+/// True if a byte separates words.
 #[inline]
 pub(super) fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r' | JOINED | 0x0c)

@@ -155,7 +155,7 @@ impl TextureSet {
         self.views.len()
     }
 
-    /// Whether there is no view.
+    /// True if there is no view.
     pub fn is_empty(&self) -> bool {
         self.views.is_empty()
     }

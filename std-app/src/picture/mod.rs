@@ -48,7 +48,7 @@ pub struct Picture {
     pub height: u32,
     /// `width * height` pixels.
     pub samples: Samples,
-    /// Whether the file has an alpha channel.
+    /// True if the file has an alpha channel.
     pub has_alpha: bool,
     /// Repairs and choices, each to follow the name of the file and a colon.
     pub notes: Vec<String>,

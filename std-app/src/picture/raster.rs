@@ -91,7 +91,7 @@ pub(super) fn kept(colour: ColorType, pixels: usize) -> usize {
     pixels.saturating_mul(of_pixel)
 }
 
-/// Whether the decoded bytes are used directly.
+/// True if the decoded bytes are used directly.
 fn is_rgba(colour: ColorType) -> bool {
     colour == ColorType::Rgba8
 }
@@ -142,7 +142,7 @@ fn expanded<T: Copy>(
     Ok(rgba)
 }
 
-/// Whether a WebP is shorter than its header states.
+/// True if a WebP is shorter than its header states.
 fn is_short_webp(bytes: &[u8]) -> bool {
     let stated = bytes.get(4..8).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     bytes.len() < stated as usize + 8

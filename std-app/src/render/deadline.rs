@@ -44,7 +44,7 @@ impl<'w> Deadline<'w> {
         now.checked_add(left.mul_f32(fraction.clamp(0.0, 1.0)))
     }
 
-    /// Whether the interrupt flag is raised.
+    /// True if the interrupt flag is raised.
     pub(super) fn is_interrupted(&self) -> bool {
         let is_raised = self.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed));
         if is_raised {
@@ -53,17 +53,17 @@ impl<'w> Deadline<'w> {
         is_raised
     }
 
-    /// Whether prepasses must end.
+    /// True if prepasses must end.
     pub(super) fn is_over(&self) -> bool {
         self.has_ended_for(PREPASS_GRACE)
     }
 
-    /// Whether the first sample of each pixel must end.
+    /// True if the first sample of each pixel must end.
     pub(super) fn is_late(&self) -> bool {
         self.has_ended_for(FIRST_SAMPLE_GRACE)
     }
 
-    /// Whether the first samples of tiles, begun at `start`, are to end.
+    /// True if the first samples of tiles, begun at `start`, are to end.
     pub(super) fn ends_samples_since(&self, start: Instant) -> bool {
         start.elapsed() >= TILES_GRACE && self.has_ended_for(TILES_GRACE)
     }

@@ -138,7 +138,7 @@ impl<'m> Memory<'m> {
         self.limit.map_or(usize::MAX, |limit| limit.saturating_sub(self.total()))
     }
 
-    /// Whether `bytes` more stay within the limit.
+    /// True if `bytes` more stay within the limit.
     pub(super) fn has(&self, bytes: usize) -> bool {
         self.limit.is_none_or(|limit| self.total().saturating_add(bytes) <= limit)
     }

@@ -31,7 +31,7 @@ pub struct Merged {
     pub rejected_tiles: Vec<RejectedTile>,
     /// Black pixels, whose samples were all rejected.
     pub empty_pixels: u64,
-    /// Whether the method is biased, for instance by photon blur. An unmeasured bias is not in the error.
+    /// True if the method is biased, for instance by photon blur. An unmeasured bias is not in the error.
     pub is_biased: bool,
     /// Error from the two half-films, including bias if all shards were audited.
     pub error: Option<ErrorEstimate>,

@@ -73,9 +73,9 @@ pub struct Settings {
     pub seed: u32,
     /// Most segments of a path; 1 is directly visible light. `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Whether neighbouring pixels share paths; `None`: as the pilot on a few tiles decides.
+    /// True if neighbouring pixels share paths; `None`: as the pilot on a few tiles decides.
     pub reuse: Option<bool>,
-    /// Whether paths are merged with caustic photons if a prepass finds that they pay.
+    /// True if paths are merged with caustic photons if a prepass finds that they pay.
     pub caustics: bool,
     /// Settings of irradiance caches.
     pub cache: CacheSettings,
@@ -87,9 +87,9 @@ pub struct Settings {
     pub virtual_lights: VirtualLightSettings,
     /// Settings of Metropolis light transport.
     pub metropolis: MetropolisSettings,
-    /// Whether photon maps are rendered at the end for a report, outside the measured time.
+    /// True if photon maps are rendered at the end for a report, outside the measured time.
     pub photon_view: bool,
-    /// Whether the environment is sampled by visibility tables, which a prepass learns; `None`: as the
+    /// True if the environment is sampled by visibility tables, which a prepass learns; `None`: as the
     /// prepass decides.
     pub environment_visibility: Option<bool>,
     /// Number of threads; `None`: all of the machine.

@@ -259,7 +259,7 @@ impl<'a> Progressive<'a> {
         });
     }
 
-    /// Whether rounds end although no stop rule holds. A first round that was cut would be cut again.
+    /// True if rounds end although no stop rule holds. A first round that was cut would be cut again.
     fn is_ended(&self, plan: &Plan) -> bool {
         self.lost.is_some() || self.rounds.spp() == 0 || self.is_interrupted() && !plan.first
     }

@@ -10,9 +10,9 @@ use std::path::Path;
 #[derive(Default)]
 pub(super) struct RewrittenFile<'a> {
     path: Option<&'a Path>,
-    /// Whether it is a pipe or device, which cannot be replaced and receives only the last write.
+    /// True if it is a pipe or device, which cannot be replaced and receives only the last write.
     is_stream: bool,
-    /// Whether the file is older than the state of the render.
+    /// True if the file is older than the state of the render.
     is_owed: bool,
     failed: Option<FileError>,
     is_known: Cell<bool>,

@@ -95,7 +95,7 @@ pub(super) struct Plan {
     pub(super) target: u32,
     /// Clock reading in seconds at which the round is cut.
     pub(super) deadline: Option<f64>,
-    /// Whether it is the first round, which is completed even past the deadline, so that every pixel has a
+    /// True if it is the first round, which is completed even past the deadline, so that every pixel has a
     /// sample.
     pub(super) first: bool,
     /// Seconds per sample of all pixels, if known.
@@ -148,7 +148,7 @@ impl Rounds {
         Estimates { next: self.next_estimate, last, first_noise: self.first_noise }
     }
 
-    /// Whether an error estimate is due.
+    /// True if an error estimate is due.
     pub(super) fn estimate_is_due(&self) -> bool {
         self.spp >= self.next_estimate
     }
@@ -222,7 +222,7 @@ impl Rounds {
         [by_samples, by_time, by_error].into_iter().flatten().reduce(f64::min).map(|left| left.max(0.0))
     }
 
-    /// Whether only the audit keeps the render from its end: its pixels are noisier than the picture's, and
+    /// True if only the audit keeps the render from its end: its pixels are noisier than the picture's, and
     /// its uncertainty is more than half of the requested error.
     pub(super) fn waits_for(&self, audited: &Audited) -> bool {
         let Some(wanted) = self.stop.error.filter(|_| self.spp >= FEWEST_FOR_ERROR) else { return false };
@@ -230,13 +230,13 @@ impl Rounds {
         is_open && audited.noise.upper <= ENOUGH * wanted && audited.imbalance > 1.0
     }
 
-    /// Whether the bias exceeds the requested error, judged by enough samples.
+    /// True if the bias exceeds the requested error, judged by enough samples.
     pub(super) fn is_out_of_reach(&self, audited: &Audited) -> bool {
         let enough = self.spp >= FEWEST_FOR_ERROR && audited.samples >= FEWEST_FOR_BIAS;
         enough && !audited.is_blind && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
     }
 
-    /// Whether `noise` shared by all samples stays above the requested error. Noise falls as a + b/n with n
+    /// True if `noise` shared by all samples stays above the requested error. Noise falls as a + b/n with n
     /// samples; a is significant if the lower end of noise is far above the extrapolated b/n.
     pub(super) fn has_floor(&mut self, noise: ErrorEstimate) -> bool {
         let Some(wanted) = self.stop.error.filter(|_| self.spp >= FEWEST_FOR_ERROR) else { return false };

@@ -174,7 +174,7 @@ impl WithFeatures for Render<'_> {
     }
 }
 
-/// Whether path tracing is to replace the method that prepasses chose for the picture `done`: the requested
+/// True if path tracing is to replace the method that prepasses chose for the picture `done`: the requested
 /// error is out of the method's reach, and at least half of the time is left.
 fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
     let is_lost = matches!(done.ending, Ending::Biased | Ending::NoiseFloor);

@@ -27,7 +27,7 @@ pub struct IrradianceStudy {
     pub records: u64,
     /// Approximate number of held-out points.
     pub points: u32,
-    /// Whether caches are filled in passes, each with half the radii of the previous pass (Křivánek et al.
+    /// True if caches are filled in passes, each with half the radii of the previous pass (Křivánek et al.
     /// 2006, §5).
     pub progressive: bool,
 }

@@ -218,7 +218,7 @@ pub(super) struct RoundLimits {
     pub(super) step: u32,
     /// End of a round that is cut.
     pub(super) deadline: Option<Instant>,
-    /// Whether it is the first, which an interruption ends later than others.
+    /// True if it is the first, which an interruption ends later than others.
     pub(super) is_first: bool,
 }
 

@@ -43,7 +43,7 @@ pub fn check_folder(folder: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Whether a report may replace the file at `path`.
+/// True if a report may replace the file at `path`.
 fn is_ours(path: &Path, marks: &[&str]) -> io::Result<bool> {
     if Destination::of(path)?.is_stream() || !path.exists() {
         return Ok(true);

@@ -50,7 +50,7 @@ struct LogError {
 }
 
 impl Race<'_> {
-    /// Whether errors are measured against a reference.
+    /// True if errors are measured against a reference.
     pub fn has_reference(&self) -> bool {
         self.entries.iter().any(|entry| entry.run.settings.reference.is_some())
     }

@@ -60,22 +60,22 @@ impl Destination {
         &self.path
     }
 
-    /// Whether it is written in place.
+    /// True if it is written in place.
     pub fn is_stream(&self) -> bool {
         matches!(self.kind, Kind::Stream | Kind::Descriptor(_))
     }
 
-    /// Whether it is a folder.
+    /// True if it is a folder.
     pub(crate) fn is_folder(&self) -> bool {
         self.kind == Kind::Folder
     }
 
-    /// Whether it is the standard output of the program.
+    /// True if it is the standard output of the program.
     pub fn is_stdout(&self) -> bool {
         self.kind == Kind::Descriptor(1)
     }
 
-    /// Whether it is the standard error of the program.
+    /// True if it is the standard error of the program.
     pub(crate) fn is_stderr(&self) -> bool {
         self.kind == Kind::Descriptor(2)
     }

@@ -49,7 +49,7 @@ impl Format {
             .ok_or_else(|| FileError::new("the name must end in .png, .exr, .hdr or .pfm").at(path))
     }
 
-    /// Whether the values are linear radiance and not display values.
+    /// True if the values are linear radiance and not display values.
     pub fn is_linear(self) -> bool {
         self != Format::Png
     }

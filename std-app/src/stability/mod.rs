@@ -32,7 +32,7 @@ pub struct Outcome {
     pub expected: String,
     /// Measured answer.
     pub measured: String,
-    /// Whether both agree.
+    /// True if both agree.
     pub passed: bool,
 }
 

@@ -30,15 +30,15 @@ pub(in crate::method) const FIRST_RADIUS: f64 = 1.25;
 /// Number of the first sample of the pilot, which no picture has.
 const FIRST_SAMPLE_OF_PILOT: u32 = 1 << 30;
 
-/// How often each technique is used.
+/// Sample counts of the techniques.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BidirectionalSettings {
     /// Light paths for each sample of the picture, in tasks of 1024; `None`: half as many as pixels, or as
-    /// many where vertices are merged.
+    /// many if vertices are merged.
     pub light_paths: Option<u32>,
     /// Light vertices that a camera vertex is connected to; 0 is light tracing. `None`: 1.
     pub connections: Option<u32>,
-    /// Whether vertices are merged; `None`: where the scene has caustics.
+    /// True if vertices are merged; `None`: if the scene has caustics.
     pub merging: Option<bool>,
 }
 
@@ -46,7 +46,7 @@ impl BidirectionalSettings {
     /// Light tracing: neither connections nor merges.
     pub const LIGHT_TRACING: Self = Self { light_paths: None, connections: Some(0), merging: Some(false) };
 
-    /// Whether nothing is left open.
+    /// True if no count is left open.
     pub fn is_complete(&self) -> bool {
         self.light_paths.is_some() && self.connections.is_some() && self.merging.is_some()
     }

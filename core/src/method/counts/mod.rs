@@ -116,9 +116,9 @@ fn structural(context: &RenderContext) -> Option<&'static str> {
 /// Noise × work by the pilot: relative variance of a sample of a pixel, times its rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightPaths {
-    /// With the counts of the choice.
+    /// Product of light paths with the chosen counts.
     pub product: f64,
-    /// Of path tracing; `None` where caustic photons supply light that its paths seldom find.
+    /// Product of path tracing; `None` if caustic photons supply light that its paths rarely find.
     pub of_paths: Option<f64>,
 }
 
@@ -127,7 +127,7 @@ fn used<'f>(findings: &'f Findings, topic: &str) -> Option<&'f Finding> {
     findings.get(topic).filter(|finding| finding.decision != Decision::LeftOut)
 }
 
-/// Whether the photons of path tracing are its means against rare light.
+/// True if the photons of path tracing are its means against rare light.
 fn has_caustic_photons(findings: &Findings) -> bool {
     let share = used(findings, "caustic_photons").and_then(|finding| finding.number("share_of_light"));
     share.is_some_and(|share| share > CAUSTIC_LIGHT)

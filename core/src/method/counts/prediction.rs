@@ -26,7 +26,7 @@ pub struct Candidate {
     pub light_paths: f32,
     /// Connections of a camera vertex.
     pub connections: u32,
-    /// Whether vertices are merged.
+    /// True if vertices are merged.
     pub merging: bool,
 }
 
@@ -123,7 +123,7 @@ impl Weighed {
         self.contribution.value
     }
 
-    /// Whether it is the light of the photons around a vertex.
+    /// True if it is the light of the photons around a vertex.
     pub fn is_merge(&self) -> bool {
         self.contribution.class() == Class::Merges
     }

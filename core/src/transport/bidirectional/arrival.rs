@@ -20,7 +20,7 @@ impl Arrival {
         }
     }
 
-    /// Whether light is merged that comes so to the vertex at the end of segment `segments` of a camera path.
+    /// True if light is merged that comes so to the vertex at the end of segment `segments` of a camera path.
     pub(super) fn is_merged(self, segments: u32) -> bool {
         self == Arrival::FromCaster || segments > 1
     }

@@ -57,7 +57,7 @@ impl CameraPath {
         }
     }
 
-    /// Whether a rough vertex lies behind it.
+    /// True if a rough vertex lies behind it.
     pub(super) fn has_rough(&self) -> bool {
         self.has_rough == 1
     }

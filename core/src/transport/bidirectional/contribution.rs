@@ -48,7 +48,7 @@ impl Contribution {
         Class::ALL[(self.key >> 24) as usize % CLASSES]
     }
 
-    /// Whether both are of one sample of one technique, if they have the same position in their lists.
+    /// True if both are of one sample of one technique, if they have the same position in their lists.
     pub fn is_same(&self, other: &Self) -> bool {
         self.key == other.key
     }

@@ -241,8 +241,8 @@ impl<F: Features> Writer<'_, F> {
             Some(_) => 0.0,
         };
         let weight = weight_of_splat(&self.counts, &state.sums, pdf_area, scattering.pdf_to_light, merge);
-        // Where the shading normal differs from the geometric one, power was counted by the latter (Veach
-        // 1997, 5.3).
+        // Power was counted by the geometric normal, which may differ from the shading normal (Veach 1997,
+        // 5.3).
         let radiance = Rgb::from(state.power) * scattering.value * (pdf_area * weight / cos_in);
         if !(radiance.max_element() > 0.0 && radiance.is_finite()) {
             return None;
@@ -285,7 +285,7 @@ pub(in crate::transport) fn lens_point(
     seen: &crate::scene::Projection,
 ) -> Vec3 {
     if let Some(start) = camera.start {
-        // Where rays of a far camera start: the eye is too far for f32.
+        // Rays of a far camera start on a plane, because the eye is too far for f32.
         let beyond = seen.distance - start.depth / seen.direction.dot(camera.forward);
         return position - seen.direction * beyond.max(0.0);
     }

@@ -18,7 +18,7 @@
 
 pub use crate::transport::walk::sums::Sums;
 
-/// How often each technique is used for a sample of a pixel.
+/// Expected uses of each technique for a sample of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counts {
     /// L: light paths of a sample of the picture; every vertex of them is splatted. 0 without splats.
@@ -31,7 +31,7 @@ pub struct Counts {
 }
 
 impl Sums {
-    /// Of a light path that arrives at its first vertex, whose light has density `pdf_light` for a light
+    /// Sums of a light path that arrives at its first vertex, whose light has density `pdf_light` for a light
     /// sample there (a probability for lights without extent) and `emission` per étendue.
     pub fn at_light(counts: &Counts, pdf_light: f32, emission: f32, cos_in: f32, can_be_hit: bool) -> Self {
         let inverse = 1.0 / (emission * cos_in);
@@ -42,7 +42,7 @@ impl Sums {
         }
     }
 
-    /// Of a camera path that leaves the lens by a ray of density `pdf_pixel` among those of its pixel.
+    /// Sums of a camera path that leaves the lens by a ray of density `pdf_pixel` among those of its pixel.
     pub fn at_camera(counts: &Counts, pdf_pixel: f32) -> Self {
         Self { last: counts.light_paths / pdf_pixel, rest: 0.0, pending_merge: 0.0 }
     }

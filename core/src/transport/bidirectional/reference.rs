@@ -291,7 +291,7 @@ impl<'a> Reference<'a> {
         Some((point, bsdf))
     }
 
-    /// How light `index` is found by camera paths.
+    /// Kind of light `index` in MIS.
     fn kind(&self, index: u32) -> LightType {
         self.emission.light_type(self.context.lights, index)
     }

@@ -136,7 +136,7 @@ pub(in crate::transport) fn reverse_pdf<F: Features>(
 /// the viewer, and depends on the walk.
 const LOWEST_COS: f32 = 2e-3;
 
-/// Whether the shading normal of `point` may have been turned towards local direction `wo`. Light paths end
+/// True if the shading normal of `point` may have been turned towards local direction `wo`. Light paths end
 /// there, camera paths are not connected.
 pub(in crate::transport) fn is_bent(point: &SurfacePoint, wo: Vec3) -> bool {
     wo.z < LOWEST_COS && point.frame.normal != point.geometric_normal

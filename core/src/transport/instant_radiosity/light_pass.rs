@@ -31,7 +31,7 @@ impl SetOutput {
     }
 }
 
-/// Whether some caustics are found by light paths alone: those of lights without extent by mirrors and smooth
+/// True if some caustics are found by light paths alone: those of lights without extent by mirrors and smooth
 /// glass.
 pub fn has_hidden_caustics<F: Features>(context: &SceneContext<F>) -> bool {
     context.has_mirrors && context.lights.has_delta_lights()

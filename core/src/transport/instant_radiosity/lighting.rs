@@ -40,7 +40,7 @@ pub struct VirtualLighting<'l> {
     /// b, density per area up to which all light of a surface is that of its virtual lights, 1/m². With 0
     /// there are no connections.
     pub bound: f32,
-    /// Whether light that the bound cuts is left out.
+    /// True if light that the bound cuts is left out.
     pub is_clamped: bool,
     /// Splats on the pixels of the tile.
     pub splats: &'l [[f32; 3]],

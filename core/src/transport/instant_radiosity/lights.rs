@@ -41,20 +41,20 @@ const HIDDEN: u32 = 1 << 30;
 /// Lowest cosine of a direction to the shading normal below which that may be turned to the viewer.
 const LOWEST_COS: f32 = 2e-3;
 
-/// Whether virtual lights are left on `bsdf`: it has a diffuse part, and no lobe in which a virtual light
+/// True if virtual lights are left on `bsdf`: it has a diffuse part, and no lobe in which a virtual light
 /// would be a spike, or nothing at all.
 #[inline]
 pub(super) fn holds_virtual_lights(bsdf: &Bsdf) -> bool {
     matches!(bsdf, Bsdf::Diffuse(_)) || bsdf.is_receiver() && bsdf.has_rough_coat() && !bsdf.has_narrow_coat()
 }
 
-/// Whether virtual lights light `bsdf`.
+/// True if virtual lights light `bsdf`.
 #[inline]
 pub(super) fn is_lit_by_virtual_lights(bsdf: &Bsdf) -> bool {
     !bsdf.is_delta() && !bsdf.is_caustic_caster()
 }
 
-/// Whether the shading normal of `point` may have been turned to its viewer in direction `to_viewer`, and
+/// True if the shading normal of `point` may have been turned to its viewer in direction `to_viewer`, and
 /// depends on that. Virtual lights do not shine there.
 #[inline]
 pub(super) fn is_bent(point: &SurfacePoint, to_viewer: Vec3) -> bool {
@@ -112,7 +112,7 @@ impl VirtualLight {
         self.segments & !(DIFFUSE | HIDDEN)
     }
 
-    /// Whether only virtual lights find its light.
+    /// True if only virtual lights find its light.
     #[inline]
     pub(super) fn is_hidden(&self) -> bool {
         self.segments & HIDDEN != 0

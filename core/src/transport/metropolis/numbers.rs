@@ -45,7 +45,7 @@ pub(super) struct Tail {
 }
 
 impl Tail {
-    /// Whether `slot` of a technique belongs to it. A light sample is at the end of a camera subpath.
+    /// True if `slot` of a technique belongs to it. A light sample is at the end of a camera subpath.
     pub(super) fn has_slot_of_technique(self, slot: usize) -> bool {
         let (from_light, vertex) = match slot {
             PIXEL..TECHNIQUE => (false, 0),

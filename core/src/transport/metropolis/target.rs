@@ -1,8 +1,8 @@
 //! Evaluation of points of primary sample space, a batch together: the light that each brings to a pixel.
 //!
-//! By multiplexed chains (Hachisuka et al. 2014) a point makes one technique of paths of one length: a number
-//! chooses it among all (s, t), and its light is that of the technique by its weight, times the number of
-//! techniques. By PSSMLT (Kelemen et al. 2002) a point makes a whole path of path tracing.
+//! A point of multiplexed chains (Hachisuka et al. 2014) is one technique (s, t) of paths of one length,
+//! which a random number chooses. Its light is the weighted contribution of the technique times the number of
+//! techniques. A point of PSSMLT (Kelemen et al. 2002) is a whole path of path tracing.
 
 use super::lanes::{LANES, Lanes};
 use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail, slots_of_technique};

@@ -122,7 +122,7 @@ fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -
     guesses == 0
 }
 
-/// Whether corner `b` is convex and the triangle with its neighbours contains no other corner.
+/// True if corner `b` is convex and the triangle with its neighbours contains no other corner.
 fn is_ear(points: &[[f64; 2]], left: &[usize], [a, b, c]: [usize; 3]) -> bool {
     let (pa, pb, pc) = (points[a], points[b], points[c]);
     if signed_area(pa, pb, pc) <= 0.0 {

@@ -61,7 +61,7 @@ pub struct MaterialEntry {
     pub emission: Option<Colour>,
     /// Texture of `emission` (`map_Ke`).
     pub emission_map: Option<Spanned<String>>,
-    /// Whether the back emits too.
+    /// True if the back emits too.
     pub two_sided: Option<bool>,
     /// Heights (`bump`).
     pub bump_map: Option<Spanned<String>>,

@@ -59,7 +59,7 @@ pub(super) struct Audit<'a> {
     truth: Box<PixelTracer<'a>>,
     /// Shard whose pixels are audited.
     shard: Shard,
-    /// Whether work is measured in seconds. Otherwise it is counted in rays, which are the same in each run.
+    /// True if work is measured in seconds. Otherwise it is counted in rays, which are the same in each run.
     by_clock: bool,
     seed: u32,
     scratch: Vec<Vec<Line>>,
@@ -80,7 +80,7 @@ pub(super) struct State {
     taken: u32,
     rays: u64,
     seconds: f64,
-    /// Whether paths were merged with the picture's photons, whose blur the audit then cannot see.
+    /// True if paths were merged with the picture's photons, whose blur the audit then cannot see.
     #[serde(default)]
     has_photons: bool,
     /// Share of the picture's light that audit paths practically never find, by a prepass with photons.
@@ -89,7 +89,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Whether the lists have equal lengths, as in every state written.
+    /// True if the lists have equal lengths, as in every state written.
     pub(super) fn is_whole(&self) -> bool {
         self.places.len() == self.pixels.len() && self.places.len() == self.shares.len()
     }
@@ -172,7 +172,7 @@ impl<'a> Audit<'a> {
         threads.saturating_add(pixels.bytes()).saturating_add(unseen)
     }
 
-    /// Whether its pixels are still to be chosen.
+    /// True if its pixels are still to be chosen.
     pub(super) fn is_open(&self) -> bool {
         self.state.places.is_empty()
     }

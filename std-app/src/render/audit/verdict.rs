@@ -24,7 +24,7 @@ pub struct Audited {
     pub rays: u64,
     /// Seconds of the audit, included in the seconds of rendering.
     pub seconds: f64,
-    /// Whether audit paths were merged with the picture's photons: their blur is not in the bias.
+    /// True if audit paths were merged with the picture's photons: their blur is not in the bias.
     pub has_photons: bool,
     /// Noise of the picture, from its half-films.
     pub noise: ErrorEstimate,
@@ -40,7 +40,7 @@ pub struct Audited {
     pub regions: Vec<Region>,
     /// Share of the picture's light that audit paths cannot find, by a prepass with photons.
     pub unseen: f64,
-    /// Whether the audit cannot separate bias from light that its paths miss; `total` is then noise alone.
+    /// True if the audit cannot separate bias from light that its paths miss; `total` is then noise alone.
     pub is_blind: bool,
 }
 
@@ -57,12 +57,12 @@ pub struct Region {
     pub height: u32,
     /// Relative excess of its brightness.
     pub deviation: Deviation,
-    /// Whether the deviation is significant, at 2.5 % for all regions and the whole picture together.
+    /// True if the deviation is significant, at 2.5 % for all regions and the whole picture together.
     pub is_biased: bool,
 }
 
 impl Audited {
-    /// Whether a bias is significant. Unbiased pictures are reported biased in at most 5 % of cases.
+    /// True if a bias is significant. Unbiased pictures are reported biased in at most 5 % of cases.
     pub fn is_biased(&self) -> bool {
         let is_significant = self.bias.is_significant()
             || self.whole_is_biased()
@@ -79,7 +79,7 @@ impl Audited {
         Self { unseen, is_blind, total, ..self }
     }
 
-    /// Whether the deviation of the whole picture is significant.
+    /// True if the deviation of the whole picture is significant.
     pub fn whole_is_biased(&self) -> bool {
         self.whole.chance() < LEVEL / (self.regions.len() + 1) as f64
     }

@@ -50,7 +50,7 @@ pub(super) struct Plan<'a, F> {
     method: Method,
     /// Method to report: the requested one where path tracing replaces it.
     reported: Method,
-    /// Whether prepasses may choose another method.
+    /// True if prepasses may choose another method.
     is_open: bool,
     /// Path tracing without caustic photons, by its prepass.
     paths: Option<Box<CausticPathTracing<'a, F>>>,

@@ -39,7 +39,7 @@ struct Properties {
     converges: bool,
     finds_caustics: bool,
     shares: bool,
-    /// Whether paths without light paths of their own may be joined with caustic photons.
+    /// True if paths without light paths of their own may be joined with caustic photons.
     may_join_caustics: bool,
     /// Settings of the method alone, which determine its picture.
     settings: fn(&Settings) -> String,
@@ -191,23 +191,23 @@ impl Method {
         Method::ALL.into_iter().find(|method| method.name() == name)
     }
 
-    /// Whether pictures converge to wrong radiance, or are biased until they converge; their noise does not
+    /// True if pictures converge to wrong radiance, or are biased until they converge; their noise does not
     /// reveal that.
     pub const fn is_biased(self) -> bool {
         self.properties().is_biased
     }
 
-    /// Whether the error vanishes as samples increase.
+    /// True if the error vanishes as samples increase.
     pub const fn converges(self) -> bool {
         self.properties().converges
     }
 
-    /// Whether the method finds light that path tracing may miss: caustics of small lamps.
+    /// True if the method finds light that path tracing may miss: caustics of small lamps.
     pub const fn finds_caustics(self) -> bool {
         self.properties().finds_caustics
     }
 
-    /// Whether distant pixels share a structure, which correlates their errors: then errors are independent
+    /// True if distant pixels share a structure, which correlates their errors: then errors are independent
     /// between even and odd samples, but not between tiles.
     pub const fn shares(self) -> bool {
         self.properties().shares
@@ -218,7 +218,7 @@ impl Method {
         (self.properties().settings)(settings)
     }
 
-    /// Whether its paths may be joined with caustic photons.
+    /// True if its paths may be joined with caustic photons.
     pub(in crate::render) const fn may_join_caustics(self) -> bool {
         self.properties().may_join_caustics
     }

@@ -21,9 +21,9 @@ pub(super) struct Room {
     walls: [f64; 5],
     /// Square of the ceiling: lowest corner, side, radiance.
     patch: Option<(DVec2, f64, f64)>,
-    /// Whether walls and ceiling are at infinity, as a sky.
+    /// True if walls and ceiling are at infinity, as a sky.
     is_sky: bool,
-    /// Whether a black square hangs in the air, turned so that its edges cross those of the walls one by one.
+    /// True if a black square hangs in the air, turned so that its edges cross those of the walls one by one.
     is_occluded: bool,
 }
 

@@ -33,7 +33,7 @@ pub(super) fn behind(polygon: &[DVec3], window: &[DVec3]) -> Vec<DVec3> {
     edges(window).fold(polygon.to_vec(), |polygon, (a, b)| above(&polygon, a.cross(b)))
 }
 
-/// Whether the ray from the origin along `w` meets a polygon that is counter-clockwise as seen from there,
+/// True if the ray from the origin along `w` meets a polygon that is counter-clockwise as seen from there,
 /// and its distance.
 pub(super) fn distance(polygon: &[DVec3], w: DVec3) -> Option<f64> {
     if edges(polygon).any(|(a, b)| w.dot(a.cross(b)) < 0.0) {

@@ -56,7 +56,7 @@ impl Cuboid {
         back.rotate(v.truncate()).extend(v.z)
     }
 
-    /// Whether a point is inside.
+    /// True if a point is inside.
     fn holds(&self, point: DVec3) -> bool {
         self.local(point - self.centre).abs().cmple(self.half + 0.002).all()
     }
@@ -83,7 +83,7 @@ impl Light {
         Self { corner: corner.into(), sides, normal, radiance, is_seen }
     }
 
-    /// Whether a point of its plane is on the rectangle.
+    /// True if a point of its plane is on the rectangle.
     fn holds(&self, point: DVec3) -> bool {
         let from = point - self.corner;
         let [u, v] = self.sides.map(|side| from.dot(side) / side.length_squared());
@@ -169,7 +169,7 @@ impl Room {
         (albedo * irradiance / core::f64::consts::PI, t)
     }
 
-    /// Whether a cuboid hides the end of `segment`.
+    /// True if a cuboid hides the end of `segment`.
     fn is_hidden(&self, from: DVec3, segment: DVec3) -> bool {
         self.cuboids.iter().any(|cuboid| cuboid.hit(from, segment).is_some_and(|(t, _)| t < 1.0 - 1e-6))
     }

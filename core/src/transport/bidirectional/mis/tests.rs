@@ -121,7 +121,7 @@ impl Path {
             }
     }
 
-    /// Whether light that comes to vertex `i` may be merged there.
+    /// True if light that comes to vertex `i` may be merged there.
     fn arrival(&self, i: usize) -> Option<Arrival> {
         let of = |i: usize| {
             Arrival::of(
@@ -133,7 +133,7 @@ impl Path {
         if i > 1 { of(i) } else { None }
     }
 
-    /// Whether it is merged there, in a path of this length.
+    /// True if it is merged there, in a path of this length.
     fn is_caustic(&self, i: usize) -> bool {
         let segments = (self.vertices.len() + 1 - i) as u32;
         self.arrival(i).is_some_and(|arrival| arrival.is_merged(segments))
@@ -212,7 +212,7 @@ impl Path {
             self.vertices[vertex - 1].eta_vcm * by_light(at) * by_camera(at)
         });
         let sum: f64 = all.iter().sum::<f64>() + merge;
-        // By the segment that each technique connects: 0 is the hit, s the segment after x_{s-1}.
+        // Weights by the connected segment: 0 is the hit, s the segment after x_{s-1}.
         let mut weights = vec![0.0; k + 1];
         weights[0] = all[0] / sum;
         for (i, density) in all[1..].iter().enumerate() {

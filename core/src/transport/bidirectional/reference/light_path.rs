@@ -46,7 +46,7 @@ impl LightPath {
         self.count
     }
 
-    /// Whether it has none.
+    /// True if it has none.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }

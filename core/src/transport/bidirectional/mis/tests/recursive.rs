@@ -13,7 +13,7 @@ struct CameraSums {
     at_light: Sums,
     /// η at each vertex that the path may be merged at.
     merge: Vec<f32>,
-    /// Whether a rough vertex lies between the camera and each vertex.
+    /// True if a rough vertex lies between the camera and each vertex.
     has_rough: Vec<bool>,
 }
 
