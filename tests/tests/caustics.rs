@@ -429,17 +429,17 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
         let frame = (discs, [SIZE; 2]);
         CausticPhotonTracer::<All>::new((&scene, &bvh, &lights), emission, shot, frame, level)
     };
-    let look = |emission, map, worth: &mut GuideStats, scratch: &mut Arena| {
-        let shooter = shooter(emission);
+    let learn = |emission, map, stats: &mut GuideStats, scratch: &mut Arena| {
+        let tracer = shooter(emission);
         for task in 0..TASKS / 2 {
-            let mut finds = [GuideSample::default(); PATHS_PER_TASK];
-            shooter.look(task, map, scratch, &mut finds).unwrap();
-            finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
+            let mut samples = [GuideSample::default(); PATHS_PER_TASK];
+            tracer.sample_guide(task, map, scratch, &mut samples).unwrap();
+            samples.iter().for_each(|sample| stats.learn(sample.cell, sample.benefit));
         }
     };
-    look(&aimed, 0, &mut worth, &mut scratch);
+    learn(&aimed, 0, &mut worth, &mut scratch);
     let once = worth.guide(&plain, &mut memory).unwrap();
-    look(&once, 1, &mut worth, &mut scratch);
+    learn(&once, 1, &mut worth, &mut scratch);
     let learned = worth.guide(&plain, &mut memory).unwrap();
     assert_eq!(memory.available(), 0, "footprints are exact");
     assert!(GuideStats::aimed(&scene, &lights, &plain, &mut memory).is_err());
