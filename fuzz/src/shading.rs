@@ -6,8 +6,8 @@ use halflight_simd::Level;
 use halflight_simd::kernels::shade::bsdf::{BsdfBlock, Direct, LightBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::camera::CameraRays;
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
-use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock};
-use halflight_simd::kernels::shade::surface::Surfaces;
+use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::{Row, Row3};
 
 /// One input.
@@ -141,7 +141,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         raster: &raster,
     };
     for level in Level::detect().and_below() {
-        let found = surfaces.compute(level);
+        let mut found = SurfaceBlock::EMPTY;
+        surfaces.compute(level, &mut found);
         assert_eq!(found.regular, surface.regular, "{level:?}");
         let set = surface.regular;
         check("position", set, &found.position, &surface.position);
@@ -166,7 +167,9 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         check_records("ray", wanted.exists, &found.rays, &wanted.rays);
         check_records("state", wanted.exists, &found.states, &wanted.states);
 
-        assert_eq!(samples.vertices(level, offsets, true), samples.reference(offsets, true), "{level:?}");
+        let mut found = VertexNumbers::EMPTY;
+        samples.vertices(level, offsets, true, &mut found);
+        assert_eq!(found, samples.reference(offsets, true), "{level:?}");
         check_records("camera ray", 0xffff, &camera.compute(level), &camera.reference());
     }
     Ok(())

@@ -9,12 +9,13 @@ use super::border::Edges;
 use super::emitted::{emitted_at, spot_falloff};
 use super::environment::EnvironmentSampler;
 use super::environment_visibility::{EnvironmentVisibility, VisibilityTable, WarpedSample};
-use super::tree::Tree;
+use super::tree::{ChosenBlock, Tree};
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON};
 use crate::scene::{Mesh, PointLight, Scene};
 use crate::{Level, Rgb};
 use glam::Vec3;
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
+use halflight_simd::kernels::shade::{BLOCK, Row, Row3};
 
 /// Least probability of each kind of light that exists.
 const MIN_PROBABILITY: f32 = 0.1;
@@ -195,10 +196,7 @@ impl<'m> LightSampler<'m> {
             let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
             let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;
             let probability = probability * shares.tree;
-            return Some(match self.emitters.get(light as usize) {
-                Some(emitter) => ChosenLight::Emitter { emitter, light, probability },
-                None => ChosenLight::Point { light, probability },
-            });
+            return Some(self.light(light, probability));
         }
         let choice = choice - shares.tree;
         if choice < shares.environment {
@@ -207,6 +205,42 @@ impl<'m> LightSampler<'m> {
         let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
         let (index, probability, _) = self.distant_table.sample(choice)?;
         Some(ChosenLight::Distant { index, probability: probability * shares.distant })
+    }
+
+    /// Chooses lights for the vertices of a block in `active` by the numbers `u`; `None` in scenes with an
+    /// environment or directional lights.
+    #[inline]
+    pub(crate) fn choose_block(&self, places: (&Row3, &Row3), u: &Row, active: u32) -> Option<ChosenBlock> {
+        let is_near = self.environment_weight + self.distant_weight == 0.0;
+        is_near.then(|| self.tree.sample_block(places, u, active))
+    }
+
+    /// Light of vertex `i` of a block.
+    #[inline]
+    pub(crate) fn chosen(&self, block: &ChosenBlock, i: usize) -> ChosenLight<'m> {
+        self.light(block.lights[i % BLOCK], block.probabilities[i % BLOCK])
+    }
+
+    /// Light number `light` of the tree.
+    #[inline]
+    fn light(&self, light: u32, probability: f32) -> ChosenLight<'m> {
+        match self.emitters.get(light as usize) {
+            Some(emitter) => ChosenLight::Emitter { emitter, light, probability },
+            None => ChosenLight::Point { light, probability },
+        }
+    }
+
+    /// Makes the only light, an area light without texture, the light of every vertex of a block. Returns its
+    /// first triangle and the probability of the choice; `None` in other scenes.
+    #[inline]
+    pub(crate) fn put_lone(&self, block: &mut EmitterBlock) -> Option<(u32, f32)> {
+        let [emitter] = self.emitters else { return None };
+        if self.count() > 1 || emitter.is_textured() {
+            return None;
+        }
+        (block.triangles, block.rectangles, block.two_sided) = (0, 0, 0);
+        (0..16).for_each(|i| emitter.put(block, i));
+        Some((emitter.triangle, 1.0))
     }
 
     /// [`LightSampler::sample_deferred`] of a chosen light.

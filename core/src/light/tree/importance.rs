@@ -78,7 +78,7 @@ impl LightBounds {
     /// if no light of the group can reach the front of the surface.
     #[inline]
     pub(super) fn importance(&self, point: Vec3, normal: Vec3) -> f32 {
-        importance(|value| value, self, point, normal)
+        importance(self, point, normal)
     }
 }
 
@@ -105,33 +105,33 @@ impl LightBounds8 {
     /// [`LightBounds::importance`] of each group.
     #[inline(always)]
     pub(super) fn importance<S: Simd>(&self, simd: S, point: Vec3, normal: Vec3) -> [f32; GROUPS] {
-        let load = |values: &[f32; GROUPS]| simd.load8(values);
         let groups = LightBounds {
-            center: [load(&self.center[0]), load(&self.center[1]), load(&self.center[2])],
-            radius: load(&self.radius),
-            axis: [load(&self.axis[0]), load(&self.axis[1]), load(&self.axis[2])],
-            sin_cone: load(&self.sin_cone),
-            cos_cone: load(&self.cos_cone),
-            power: load(&self.power),
+            center: [simd.load8(&self.center[0]), simd.load8(&self.center[1]), simd.load8(&self.center[2])],
+            radius: simd.load8(&self.radius),
+            axis: [simd.load8(&self.axis[0]), simd.load8(&self.axis[1]), simd.load8(&self.axis[2])],
+            sin_cone: simd.load8(&self.sin_cone),
+            cos_cone: simd.load8(&self.cos_cone),
+            power: simd.load8(&self.power),
         };
-        importance(|value| simd.splat8(value), &groups, point, normal).to_array()
+        importance(&groups, point, normal).to_array()
     }
 }
 
-/// See [`LightBounds::importance`]; `all` puts a value into all lanes.
+/// See [`LightBounds::importance`].
 #[inline(always)]
-fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: Vec3, normal: Vec3) -> L {
-    let (zero, one) = (all(0.0), all(1.0));
-    let parts = [zero, all(0.5), all(MIN_COSINE)];
+fn importance<L: Lanes>(group: &LightBounds<L>, point: Vec3, normal: Vec3) -> L {
+    let any = group.radius;
+    let (zero, one) = (any.all(0.0), any.all(1.0));
+    let parts = [zero, any.all(0.5), any.all(MIN_COSINE)];
     let [cx, cy, cz] = group.center;
-    let to_light = [cx - all(point.x), cy - all(point.y), cz - all(point.z)];
+    let to_light = [cx - any.all(point.x), cy - any.all(point.y), cz - any.all(point.z)];
     let (square, distance2) = (group.radius * group.radius, dot(to_light, to_light));
     let inverse = one / distance2.sqrt();
-    let direction = to_light.map(|along| along * inverse);
+    let direction = [to_light[0] * inverse, to_light[1] * inverse, to_light[2] * inverse];
     // θ_u: half-angle of the cone that the sphere fills.
     let sin_u = group.radius * inverse;
     let uncertainty = (sin_u, sine(sin_u, zero, one));
-    let spread = all(SPREAD) * sin_u * sin_u;
+    let spread = any.all(SPREAD) * sin_u * sin_u;
     let cos = -dot(direction, group.axis);
     let sin = sine(cos, zero, one);
     // θ' = max(θ - θ_o - θ_u, 0), the least angle to a normal of the group.
@@ -139,23 +139,23 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: V
     let most = minus_clamped(angle, uncertainty, zero, one).1;
     // Normals that fill a cone of half-angle θ_o evenly have the mean m = (1 + cos θ_o) / 2 along its axis,
     // with variance (1 - m)² / 3; the rest of 1 is across.
-    let mean = all(0.5) * (one + group.cos_cone);
-    let along = (one - mean) * (one - mean) * all(1.0 / 3.0);
-    let across = all(0.5) * (one - mean * mean - along);
-    let variance = all(CLAMPED) * (along * cos * cos + across * sin * sin) + spread * sin * sin;
+    let mean = any.all(0.5) * (one + group.cos_cone);
+    let along = (one - mean) * (one - mean) * any.all(1.0 / 3.0);
+    let across = any.all(0.5) * (one - mean * mean - along);
+    let variance = any.all(CLAMPED) * (along * cos * cos + across * sin * sin) + spread * sin * sin;
     let shone = facing(mean * cos, variance, most, parts);
-    let shone = shone.select(all(-1.0).lt(group.cos_cone), all(OMNIDIRECTIONAL));
+    let shone = shone.select(any.all(-1.0).lt(group.cos_cone), any.all(OMNIDIRECTIONAL));
     let mut strength = group.power * inverse * inverse * shone;
     if normal != Vec3::ZERO {
-        let cos = dot(direction, [all(normal.x), all(normal.y), all(normal.z)]);
+        let cos = dot(direction, [any.all(normal.x), any.all(normal.y), any.all(normal.z)]);
         let most = minus_clamped((sine(cos, zero, one), cos), uncertainty, zero, one).1;
         strength = strength * facing(cos, spread, most, parts);
     }
     // Inside the sphere lights may lie in any direction.
-    let within = all(OMNIDIRECTIONAL) * group.power / square.max(all(f32::MIN_POSITIVE));
+    let within = any.all(OMNIDIRECTIONAL) * group.power / square.max(any.all(f32::MIN_POSITIVE));
     let strength = within.select(distance2.le(square), strength);
     // Comparison with NaN is false: a NaN point receives no light.
-    strength.min(all(MAX_IMPORTANCE)).select(zero.lt(strength), zero)
+    strength.min(any.all(MAX_IMPORTANCE)).select(zero.lt(strength), zero)
 }
 
 /// Mean of the positive part of cosines of this mean and variance, whose largest is `most`. No closure: one

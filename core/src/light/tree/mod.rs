@@ -12,6 +12,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use halflight_simd::kernels::shade::{BLOCK, Row, Row3};
 use halflight_simd::{Kernel, Simd};
 use importance::{GROUPS, LightBounds, LightBounds8};
 
@@ -74,6 +75,20 @@ impl<'m> Tree<'m> {
             0 => None,
             1 => Some((0, 1.0, u)),
             _ => self.level.dispatch(SampleKernel { nodes: self.nodes, point, normal, u }),
+        }
+    }
+
+    /// [`Tree::sample`] for the vertices of a block in `active`.
+    pub(super) fn sample_block(
+        &self,
+        (points, normals): (&Row3, &Row3),
+        u: &Row,
+        active: u32,
+    ) -> ChosenBlock {
+        match self.trails.len() {
+            0 => ChosenBlock::NONE,
+            1 => ChosenBlock { exists: active, probabilities: [1.0; BLOCK], ..ChosenBlock::NONE },
+            _ => self.level.dispatch(BlockKernel { nodes: self.nodes, points, normals, u, active }),
         }
     }
 
@@ -141,25 +156,95 @@ impl Kernel for SampleKernel<'_> {
         let mut node = nodes.first()?;
         let mut probability = 1.0;
         loop {
-            let weights = node.groups.importance(simd, point, normal);
-            let ends = ends(&weights);
-            let sum = ends[GROUPS - 1];
-            let wanted = u * sum;
-            // Without a branch, which would be mispredicted most of the time.
-            let mut i = ends.iter().map(|end| usize::from(*end <= wanted)).sum::<usize>();
-            if i == GROUPS {
-                // No light reaches the point, or rounding exceeds the last light that does.
-                i = weights.iter().rposition(|weight| *weight > 0.0)?;
-            }
-            let before = if i == 0 { 0.0 } else { ends[i - 1] };
-            u = ((wanted - before) / weights[i]).clamp(0.0, ONE_MINUS_EPSILON);
-            probability *= weights[i] / sum;
-            let link = node.links[i];
+            let (link, share, rest) = step(simd, node, point, normal, u)?;
+            (u, probability) = (rest, probability * share);
             if link & LEAF != 0 {
                 return Some((link & !LEAF, probability, u));
             }
             node = nodes.get(link as usize)?;
         }
+    }
+}
+
+/// Chooses a group of `node` by `u`. Returns its link, its probability, and the remainder of `u` rescaled to
+/// [0, 1).
+#[inline(always)]
+fn step<S: Simd>(simd: S, node: &Node, point: Vec3, normal: Vec3, u: f32) -> Option<(u32, f32, f32)> {
+    let weights = node.groups.importance(simd, point, normal);
+    let ends = ends(&weights);
+    let sum = ends[GROUPS - 1];
+    let wanted = u * sum;
+    // Without a branch, which would be mispredicted most of the time.
+    let mut i = 0;
+    for end in &ends {
+        i += usize::from(*end <= wanted);
+    }
+    if i == GROUPS {
+        // No light reaches the point, or rounding exceeds the last light that does.
+        i = weights.iter().rposition(|weight| *weight > 0.0)?;
+    }
+    let before = if i == 0 { 0.0 } else { ends[i - 1] };
+    let rest = ((wanted - before) / weights[i]).clamp(0.0, ONE_MINUS_EPSILON);
+    Some((node.links[i], weights[i] / sum, rest))
+}
+
+/// Lights chosen for a block of vertices.
+pub(crate) struct ChosenBlock {
+    pub(super) lights: [u32; BLOCK],
+    pub(super) probabilities: Row,
+    /// Bit `i`: a light may reach vertex `i`.
+    pub(crate) exists: u32,
+}
+
+impl ChosenBlock {
+    const NONE: Self = Self { lights: [0; BLOCK], probabilities: [0.0; BLOCK], exists: 0 };
+}
+
+/// Kernel of [`Tree::sample_block`]. All vertices descend level by level, so that the latencies of their steps
+/// overlap.
+struct BlockKernel<'t> {
+    nodes: &'t [Node],
+    points: &'t Row3,
+    normals: &'t Row3,
+    u: &'t Row,
+    active: u32,
+}
+
+impl Kernel for BlockKernel<'_> {
+    type Out = ChosenBlock;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> ChosenBlock {
+        let Self { nodes, points, normals, u, active } = self;
+        let (mut at, mut u) = ([0; BLOCK], *u);
+        let mut chosen = ChosenBlock { probabilities: [1.0; BLOCK], ..ChosenBlock::NONE };
+        let mut descending = active;
+        while descending != 0 {
+            let mut left = descending;
+            while left != 0 {
+                let i = left.trailing_zeros() as usize % BLOCK;
+                left &= left - 1;
+                let point = Vec3::new(points[0][i], points[1][i], points[2][i]);
+                let normal = Vec3::new(normals[0][i], normals[1][i], normals[2][i]);
+                let node = nodes.get(at[i] as usize);
+                let stepped = match node {
+                    Some(node) => step(simd, node, point, normal, u[i]),
+                    None => None,
+                };
+                let Some((link, share, rest)) = stepped else {
+                    descending &= !(1 << i);
+                    continue;
+                };
+                (at[i], u[i]) = (link, rest);
+                chosen.probabilities[i] *= share;
+                if link & LEAF != 0 {
+                    chosen.lights[i] = link & !LEAF;
+                    chosen.exists |= 1 << i;
+                    descending &= !(1 << i);
+                }
+            }
+        }
+        chosen
     }
 }
 
@@ -282,6 +367,39 @@ mod tests {
                     assert!((sum - share).abs() < 0.02 && sum < 1.0 + 1e-4, "{case} {i}: {sum} {share}");
                 }
             });
+        }
+    }
+
+    #[test]
+    fn blocks_choose_the_lights_of_their_vertices() {
+        let random = Random::new(5, 5);
+        for count in [0, 1, 2, 9, 300] {
+            with_tree(
+                items(count, |random, i| Vec3::from([0, 1, 2].map(|k| random.single(3 * i + k)))),
+                |tree, _| {
+                    for round in 0..50 {
+                        let number = |k: u32, i: u32| random.single(1000 * round + 16 * k + i);
+                        let row =
+                            |k: u32| -> Row { core::array::from_fn(|i| 4.0 * number(k, i as u32) - 1.5) };
+                        let points = [row(0), row(1), row(2)];
+                        let mut normals = [[0.0; BLOCK], [0.0; BLOCK], [1.0; BLOCK]];
+                        normals[2][3] = 0.0;
+                        let u = core::array::from_fn(|i| number(3, i as u32));
+                        let active = 0xfb7f;
+                        for level in Level::detect().and_below() {
+                            let chosen = tree.with_level(level).sample_block((&points, &normals), &u, active);
+                            for i in 0..BLOCK {
+                                let point = Vec3::new(points[0][i], points[1][i], points[2][i]);
+                                let normal = Vec3::new(0.0, 0.0, normals[2][i]);
+                                let alone = tree.sample(point, normal, u[i]).filter(|_| active >> i & 1 == 1);
+                                let found = (chosen.exists >> i & 1 == 1)
+                                    .then_some((chosen.lights[i], chosen.probabilities[i]));
+                                assert_eq!(found, alone.map(|(light, probability, _)| (light, probability)));
+                            }
+                        }
+                    }
+                },
+            );
         }
     }
 

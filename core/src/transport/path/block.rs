@@ -58,6 +58,8 @@ pub(super) struct Block<'a> {
     others: [Bsdf; BLOCK],
     /// First triangles of the sampled area lights.
     lamp: [u32; BLOCK],
+    /// True if the only light is in `emitters`, at every vertex.
+    is_lone: bool,
 }
 
 /// Set of vertices of a block.
@@ -67,11 +69,23 @@ struct Set(u32);
 impl Iterator for Set {
     type Item = usize;
 
-    #[inline]
+    #[inline(always)]
     fn next(&mut self) -> Option<usize> {
         let i = self.0.trailing_zeros() as usize;
         self.0 &= self.0.wrapping_sub(1);
         (i < BLOCK).then_some(i)
+    }
+}
+
+impl Set {
+    /// Vertices whose number in `row` has the property `is`.
+    #[inline(always)]
+    fn of(row: &[u32; BLOCK], is: impl Fn(u32) -> bool) -> u32 {
+        let mut set = 0;
+        for (i, value) in row.iter().enumerate() {
+            set |= u32::from(is(*value)) << i;
+        }
+        set
     }
 }
 
@@ -117,6 +131,7 @@ impl<'a> Block<'a> {
             uv: [Vec2::ZERO; BLOCK],
             others: [Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }); BLOCK],
             lamp: [0; BLOCK],
+            is_lone: false,
         }
     }
 
@@ -176,14 +191,14 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E
             weights: &block.weights,
             rays,
         };
-        block.surface = surfaces.compute(context.level);
+        surfaces.compute(context.level, &mut block.surface);
         let met = integrator.arrive_in_block(block, (wave, range), hits, counters);
         if met == 0 {
             return;
         }
         block.samples.dimension = block.segments.map(dimension::vertex);
         let chooses = context.lights.has_many_lights();
-        block.numbers = block.samples.vertices(context.level, dimension::OFFSETS, chooses);
+        block.samples.vertices(context.level, dimension::OFFSETS, chooses, &mut block.numbers);
         if !context.lights.is_empty() {
             integrator.direct_in_block(block, wave, met);
         }
@@ -339,11 +354,28 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let light = &mut block.light;
         (light.exists, light.bounded, light.area, light.delta, light.balance) = (0, 0, 0, 0, 0);
         let emitters = &mut block.emitters;
-        (emitters.triangles, emitters.rectangles, emitters.two_sided) = (0, 0, 0);
         let (mut areas, mut environment) = (0, 0);
+        if block.is_lone {
+            (areas, lit) = (lit, 0);
+        } else if let Some((triangle, probability)) = lights.put_lone(emitters) {
+            (block.lamp, block.probability) = ([triangle; BLOCK], [probability; BLOCK]);
+            block.is_lone = true;
+            (areas, lit) = (lit, 0);
+        } else {
+            (emitters.triangles, emitters.rectangles, emitters.two_sided) = (0, 0, 0);
+        }
+        let places = (&block.surface.position, &block.side);
+        let chosen = lights.choose_block(places, &block.numbers.choice, lit);
+        lit &= chosen.as_ref().map_or(lit, |chosen| chosen.exists);
         for i in Set(lit) {
             let (position, side) = (at(&block.surface.position, i), at(&block.side, i));
-            let Some(chosen) = lights.choose(position, side, block.numbers.choice[i]) else { continue };
+            let chosen = match &chosen {
+                Some(chosen) => lights.chosen(chosen, i),
+                None => match lights.choose(position, side, block.numbers.choice[i]) {
+                    Some(chosen) => chosen,
+                    None => continue,
+                },
+            };
             if let Some((triangle, probability)) = chosen.put(emitters, i) {
                 (block.lamp[i], block.probability[i]) = (triangle, probability);
                 areas |= 1 << i;
@@ -423,7 +455,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         counters: &mut Counters,
     ) {
         let level = self.context.level;
-        let starts = Set(met).filter(|&i| block.segments[i] == 1).fold(0, |set, i| set | 1 << i);
+        let starts = met & Set::of(&block.segments, |segments| segments == 1);
         if starts != 0 {
             let pairs = block.samples.second_pairs(level, dimension::PIXEL);
             let [u, v] = &mut block.numbers.scatter;
@@ -432,7 +464,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             }
         }
         let (mut active, mut cut, mut transmits) = (met, 0, 0);
-        let long = Set(met).filter(|&i| block.segments[i] >= CERTAIN_BELOW).fold(0, |set, i| set | 1 << i);
+        let long = met & Set::of(&block.segments, |segments| segments >= CERTAIN_BELOW);
         block.most = [1.0; BLOCK];
         let others = met & !(block.bsdf.diffuse | block.bsdf.metal);
         for i in Set(long) {

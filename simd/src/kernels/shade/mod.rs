@@ -40,10 +40,13 @@ fn load3<S: Simd>(simd: S, [x, y, z]: &Row3) -> [S::F16; 3] {
 fn records8<S: Simd>(simd: S, [a, b, c, d, e, f, g, h]: [S::F16; 8]) -> [[f32; 8]; 16] {
     let (first, second) = (simd.records16([a, b, c, d]), simd.records16([e, f, g, h]));
     let mut records = [[0.0; 8]; 16];
-    for (record, (first, second)) in records.iter_mut().zip(first.iter().zip(&second)) {
-        let (low, high) = record.split_at_mut(4);
-        low.copy_from_slice(first);
-        high.copy_from_slice(second);
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "iterators would be calls without the level's instructions"
+    )]
+    for i in 0..16 {
+        let ([a, b, c, d], [e, f, g, h]) = (first[i], second[i]);
+        records[i] = [a, b, c, d, e, f, g, h];
     }
     records
 }

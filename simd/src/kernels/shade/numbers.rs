@@ -195,20 +195,22 @@ impl SampleBlock {
     /// Zeros.
     pub const EMPTY: Self = Self { place: [0; BLOCK], index: [0; BLOCK], dimension: [0; BLOCK] };
 
-    /// Numbers of the vertices; those of the choice if `chooses`.
-    pub fn vertices(&self, level: Level, offsets: Offsets, chooses: bool) -> VertexNumbers {
+    /// Numbers of the vertices into `out`; those of the choice only if `chooses`.
+    pub fn vertices(&self, level: Level, offsets: Offsets, chooses: bool, out: &mut VertexNumbers) {
         match chooses {
-            true => level.dispatch(Vertices::<true>(self, offsets)),
-            false => level.dispatch(Vertices::<false>(self, offsets)),
+            true => level.dispatch(Vertices::<true>(self, offsets, out)),
+            false => level.dispatch(Vertices::<false>(self, offsets, out)),
         }
     }
 
     /// Scalar reference; equals [`SampleBlock::vertices`] to the bit.
     pub fn reference(&self, offsets: Offsets, chooses: bool) -> VertexNumbers {
+        let mut out = VertexNumbers::EMPTY;
         match chooses {
-            true => Vertices::<true>(self, offsets).compute(),
-            false => Vertices::<false>(self, offsets).compute(),
+            true => Vertices::<true>(self, offsets, &mut out).compute(),
+            false => Vertices::<false>(self, offsets, &mut out).compute(),
         }
+        out
     }
 
     /// Pairs of numbers at one dimension.
@@ -222,14 +224,13 @@ impl SampleBlock {
     }
 }
 
-struct Vertices<'k, const CHOOSES: bool>(&'k SampleBlock, Offsets);
+struct Vertices<'k, const CHOOSES: bool>(&'k SampleBlock, Offsets, &'k mut VertexNumbers);
 
 impl<const CHOOSES: bool> Vertices<'_, CHOOSES> {
     /// All numbers in one loop: their latencies overlap.
     #[inline(always)]
-    fn compute(&self) -> VertexNumbers {
-        let Self(samples, Offsets { light, choice, scatter, roulette }) = *self;
-        let mut out = VertexNumbers::EMPTY;
+    fn compute(self) {
+        let Self(samples, Offsets { light, choice, scatter, roulette }, out) = self;
         let ([lx, ly], [sx, sy]) = (&mut out.light, &mut out.scatter);
         for i in 0..BLOCK {
             let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
@@ -241,16 +242,15 @@ impl<const CHOOSES: bool> Vertices<'_, CHOOSES> {
                 out.choice[i] = single(key, index, first.wrapping_add(choice));
             }
         }
-        out
     }
 }
 
 impl<const CHOOSES: bool> Kernel for Vertices<'_, CHOOSES> {
-    type Out = VertexNumbers;
+    type Out = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> VertexNumbers {
-        self.compute()
+    fn run<S: Simd>(self, _: S) {
+        self.compute();
     }
 }
 
@@ -291,8 +291,10 @@ mod tests {
             }
             let wanted = samples.reference(offsets, true);
             for level in Level::detect().and_below() {
-                assert_eq!(samples.vertices(level, offsets, true), wanted, "{level:?}");
-                let plain = samples.vertices(level, offsets, false);
+                let (mut found, mut plain) = (VertexNumbers::EMPTY, VertexNumbers::EMPTY);
+                samples.vertices(level, offsets, true, &mut found);
+                samples.vertices(level, offsets, false, &mut plain);
+                assert_eq!(found, wanted, "{level:?}");
                 assert_eq!((plain.light, plain.choice), (wanted.light, [0.0; BLOCK]), "{level:?}");
                 let (first, second) = (samples.pairs(level, 3), samples.second_pairs(level, 3));
                 for i in 0..BLOCK {

@@ -125,9 +125,9 @@ pub fn surface<L: Lanes>(
 }
 
 impl Surfaces<'_> {
-    /// Surface points by the instructions of `level`.
-    pub fn compute(&self, level: Level) -> SurfaceBlock {
-        level.dispatch(SurfaceKernel(self))
+    /// Surface points by the instructions of `level`, into `block`.
+    pub fn compute(&self, level: Level, block: &mut SurfaceBlock) {
+        level.dispatch(SurfaceKernel(self, block));
     }
 
     /// Scalar reference; equals [`Surfaces::compute`] to the bit.
@@ -173,13 +173,13 @@ impl SurfaceBlock {
     };
 }
 
-struct SurfaceKernel<'k, 'b>(&'k Surfaces<'b>);
+struct SurfaceKernel<'k, 'b>(&'k Surfaces<'b>, &'k mut SurfaceBlock);
 
 impl Kernel for SurfaceKernel<'_, '_> {
-    type Out = SurfaceBlock;
+    type Out = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> SurfaceBlock {
+    fn run<S: Simd>(self, simd: S) {
         let Surfaces { corners, normals, weights, rays } = self.0;
         let [.., x, y, z, _] = simd.columns16(rays);
         let three = |rows: &[Row3; 3]| [load3(simd, &rows[0]), load3(simd, &rows[1]), load3(simd, &rows[2])];
@@ -190,14 +190,14 @@ impl Kernel for SurfaceKernel<'_, '_> {
             [x, y, z],
         );
         let [tangent, bitangent, normal] = point.frame;
-        SurfaceBlock {
-            position: vector::to_arrays(point.position),
-            error: point.error.to_array(),
-            geometric_normal: vector::to_arrays(point.geometric_normal),
-            frame: [vector::to_arrays(tangent), vector::to_arrays(bitangent), vector::to_arrays(normal)],
-            wo: vector::to_arrays(point.wo),
-            front: point.front.bits(),
-            regular: point.regular.bits(),
-        }
+        let block = self.1;
+        block.position = vector::to_arrays(point.position);
+        block.error = point.error.to_array();
+        block.geometric_normal = vector::to_arrays(point.geometric_normal);
+        block.frame[0] = vector::to_arrays(tangent);
+        block.frame[1] = vector::to_arrays(bitangent);
+        block.frame[2] = vector::to_arrays(normal);
+        block.wo = vector::to_arrays(point.wo);
+        (block.front, block.regular) = (point.front.bits(), point.regular.bits());
     }
 }

@@ -142,15 +142,22 @@ impl Block {
     fn surface(&self, level: Option<Level>) {
         let Self { corners, weights, rays, .. } = self;
         let surfaces = Surfaces { corners, normals: None, weights, rays };
-        black_box(level.map_or_else(|| surfaces.reference(), |level| surfaces.compute(level)));
+        let mut block = SurfaceBlock::EMPTY;
+        match level {
+            None => block = surfaces.reference(),
+            Some(level) => surfaces.compute(level, &mut block),
+        }
+        black_box(block);
     }
 
     fn numbers(&self, level: Option<Level>) {
         let samples = &self.samples;
-        black_box(level.map_or_else(
-            || samples.reference(OFFSETS, true),
-            |level| samples.vertices(level, OFFSETS, true),
-        ));
+        let mut numbers = VertexNumbers::EMPTY;
+        match level {
+            None => numbers = samples.reference(OFFSETS, true),
+            Some(level) => samples.vertices(level, OFFSETS, true, &mut numbers),
+        }
+        black_box(numbers);
     }
 
     fn light(&self, level: Option<Level>) {
