@@ -222,6 +222,18 @@ pub trait Simd: Copy {
         records
     }
 
+    /// Eight registers of sixteen into sixteen records of eight floats.
+    #[inline(always)]
+    fn octets16(self, [a, b, c, d, e, f, g, h]: [Self::F16; 8], records: &mut [[f32; 8]; 16]) {
+        let (first, second) = (self.records16([a, b, c, d]), self.records16([e, f, g, h]));
+        let mut i = 0;
+        while i < 16 {
+            let ([a, b, c, d], [e, f, g, h]) = (first[i], second[i]);
+            records[i] = [a, b, c, d, e, f, g, h];
+            i += 1;
+        }
+    }
+
     /// Packs the `wanted` lanes to the start of `out`; the rest of `out` is unspecified.
     fn pack16(self, wanted: <Self::F16 as Lanes>::Mask, lanes: Self::F16, out: &mut [f32; 16]);
 

@@ -119,7 +119,9 @@ impl Camera {
             half: [0.5 * width as f32, 0.5 * height as f32],
             raster,
         };
-        Some(bytemuck::cast(rays.compute(level)))
+        let mut records = [[0.0; 8]; 16];
+        rays.compute(level, &mut records);
+        Some(bytemuck::cast(records))
     }
 
     /// Inverse of [`Camera::ray`]: the projection of `point` through the point `lens` of the lens. `None`

@@ -389,6 +389,25 @@ impl Simd for Avx512 {
         records
     }
     #[inline(always)]
+    fn octets16(self, [a, b, c, d, e, f, g, h]: [F16; 8], records: &mut [[f32; 8]; 16]) {
+        // SAFETY: the token proves the level; four floats are written to either half of each record.
+        unsafe {
+            let low = transposed([a.0, b.0, c.0, d.0]);
+            let high = transposed([e.0, f.0, g.0, h.0]);
+            for (i, (low, high)) in low.into_iter().zip(high).enumerate() {
+                let mut out = |k: usize| records[i + 4 * k].as_mut_ptr();
+                _mm_storeu_ps(out(0), _mm512_castps512_ps128(low));
+                _mm_storeu_ps(out(0).add(4), _mm512_castps512_ps128(high));
+                _mm_storeu_ps(out(1), _mm512_extractf32x4_ps::<1>(low));
+                _mm_storeu_ps(out(1).add(4), _mm512_extractf32x4_ps::<1>(high));
+                _mm_storeu_ps(out(2), _mm512_extractf32x4_ps::<2>(low));
+                _mm_storeu_ps(out(2).add(4), _mm512_extractf32x4_ps::<2>(high));
+                _mm_storeu_ps(out(3), _mm512_extractf32x4_ps::<3>(low));
+                _mm_storeu_ps(out(3).add(4), _mm512_extractf32x4_ps::<3>(high));
+            }
+        }
+    }
+    #[inline(always)]
     fn pack16(self, wanted: M16, lanes: F16, out: &mut [f32; 16]) {
         // SAFETY: the token proves the level; sixteen floats are written to an array of sixteen.
         unsafe { _mm512_storeu_ps(out.as_mut_ptr(), _mm512_maskz_compress_ps(wanted.0, lanes.0)) }

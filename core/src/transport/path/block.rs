@@ -22,7 +22,9 @@ use crate::transport::wavefront::{BLOCK, TO_ENVIRONMENT, Wavefront};
 use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::{Vec2, Vec3};
-use halflight_simd::kernels::shade::bsdf::{BsdfBlock, Direct, LightBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::bsdf::{
+    BsdfBlock, Direct, LightBlock, NextBlock, Scatter, ScatterBlock, ShadowBlock,
+};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
@@ -44,6 +46,8 @@ pub(super) struct Block<'a> {
     value: Row3,
     pdf: Row,
     given: ScatterBlock,
+    shadows: ShadowBlock,
+    next: NextBlock,
     throughput: Row3,
     eta_squared: Row,
     most: Row,
@@ -120,6 +124,8 @@ impl<'a> Block<'a> {
             value: [[0.0; BLOCK]; 3],
             pdf: [0.0; BLOCK],
             given: ScatterBlock::EMPTY,
+            shadows: ShadowBlock::EMPTY,
+            next: NextBlock::EMPTY,
             throughput: [[0.0; BLOCK]; 3],
             eta_squared: [0.0; BLOCK],
             most: [1.0; BLOCK],
@@ -400,8 +406,9 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             put(&mut block.value, i, f.to_array());
             block.pdf[i] = pdf;
         }
-        let Block { surface, bsdf, light, value, pdf, throughput, .. } = &*block;
-        let shadows = Direct { surface, bsdf, light, value, pdf, throughput }.compute(level);
+        let Block { surface, bsdf, light, value, pdf, throughput, shadows, .. } = &mut *block;
+        Direct { surface, bsdf, light, value, pdf, throughput }.compute(level, shadows);
+        let shadows = &block.shadows;
         for i in Set(shadows.exists) {
             let is_later = environment >> i & 1 == 1;
             let tag = block.path[i] | if is_later { TO_ENVIRONMENT } else { 0 };
@@ -488,7 +495,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             cut |= u32::from(is_cut(segments, bsdf, &sample)) << i;
             transmits |= u32::from(bsdf.transmits()) << i;
         }
-        let next = Scatter {
+        Scatter {
             surface: &block.surface,
             bsdf: &block.bsdf,
             given: &block.given,
@@ -499,7 +506,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             eta_squared: &block.eta_squared,
             active,
         }
-        .compute(level);
+        .compute(level, &mut block.next);
+        let next = &block.next;
         // Lanes do not change it.
         if others != 0 {
             block.given.eta = [1.0; BLOCK];

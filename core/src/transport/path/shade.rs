@@ -7,7 +7,6 @@ use super::block::Block;
 use super::estimator::{EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight};
 use super::sharing::PathMemory;
 use super::sharing::Sharing;
-use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::{Hit, Ray};
 use crate::light::emitted;
@@ -18,6 +17,7 @@ use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
 use crate::transport::walk::termination::{continuation_probability, is_cut};
 use crate::transport::wavefront::{BLOCK, PathState, Shade, Wavefront};
+use crate::{Level, Rgb};
 use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::Vec3;
@@ -43,7 +43,9 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
     }
 
     fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
-        if E::ADDS_NOTHING && !R::IN_CIRCLES {
+        // The baseline gains nothing by lanes, as measured with SSE2.
+        let has_lanes = cfg!(target_arch = "x86_64") && self.integrator.context.level > Level::BASELINE;
+        if E::ADDS_NOTHING && !R::IN_CIRCLES && has_lanes {
             return self.shade_block(wave, range, counters);
         }
         let Self { integrator, memory, .. } = self;

@@ -7,7 +7,7 @@
 use super::ggx::{Ggx, schlick};
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, divide, mul, scale, sub};
-use super::{Row, Row3, load3, records8, warp};
+use super::{Row, Row3, load3, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 use core::f32::consts::FRAC_1_PI;
@@ -385,9 +385,9 @@ fn vertices<S: Simd>(
 }
 
 impl Direct<'_> {
-    /// Shadow rays by the instructions of `level`.
-    pub fn compute(&self, level: Level) -> ShadowBlock {
-        level.dispatch(DirectKernel(self))
+    /// Shadow rays by the instructions of `level`, into `block`.
+    pub fn compute(&self, level: Level, block: &mut ShadowBlock) {
+        level.dispatch(DirectKernel(self, block));
     }
 
     /// Scalar reference; equals [`Direct::compute`] to the bit in lanes that exist.
@@ -419,9 +419,9 @@ impl Direct<'_> {
 }
 
 impl Scatter<'_> {
-    /// Next rays by the instructions of `level`.
-    pub fn compute(&self, level: Level) -> NextBlock {
-        level.dispatch(ScatterKernel(self))
+    /// Next rays by the instructions of `level`, into `block`.
+    pub fn compute(&self, level: Level, block: &mut NextBlock) {
+        level.dispatch(ScatterKernel(self, block));
     }
 
     /// Scalar reference; equals [`Scatter::compute`] to the bit in lanes that exist.
@@ -454,13 +454,13 @@ impl Scatter<'_> {
     }
 }
 
-struct DirectKernel<'k, 'b>(&'k Direct<'b>);
+struct DirectKernel<'k, 'b>(&'k Direct<'b>, &'k mut ShadowBlock);
 
 impl Kernel for DirectKernel<'_, '_> {
-    type Out = ShadowBlock;
+    type Out = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> ShadowBlock {
+    fn run<S: Simd>(self, simd: S) {
         let Direct { surface, bsdf, light, value, pdf, throughput } = self.0;
         let light = LightLanes {
             direction: load3(simd, &light.direction),
@@ -477,21 +477,20 @@ impl Kernel for DirectKernel<'_, '_> {
         let ray = direct(&vertex, &light, (load3(simd, value), simd.load16(pdf)));
         let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
         let zero = simd.splat16(0.0);
-        ShadowBlock {
-            rays: records8(simd, [ox, oy, oz, ray.end, dx, dy, dz, zero]),
-            contribution: simd.records16([r, g, b, zero]),
-            exists: ray.exists.bits(),
-        }
+        let block = self.1;
+        simd.octets16([ox, oy, oz, ray.end, dx, dy, dz, zero], &mut block.rays);
+        block.contribution = simd.records16([r, g, b, zero]);
+        block.exists = ray.exists.bits();
     }
 }
 
-struct ScatterKernel<'k, 'b>(&'k Scatter<'b>);
+struct ScatterKernel<'k, 'b>(&'k Scatter<'b>, &'k mut NextBlock);
 
 impl Kernel for ScatterKernel<'_, '_> {
-    type Out = NextBlock;
+    type Out = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> NextBlock {
+    fn run<S: Simd>(self, simd: S) {
         let Scatter { surface, bsdf, given, u, roulette, most, throughput, eta_squared, active } = self.0;
         let given = ScatterLanes {
             direction: load3(simd, &given.direction),
@@ -510,11 +509,10 @@ impl Kernel for ScatterKernel<'_, '_> {
         let ([ox, oy, oz], [dx, dy, dz]) = (next.origin, next.direction);
         let ([r, g, b], [x, y, z]) = (next.throughput, vertex.position);
         let [nx, ny, nz] = vertex.frame[2];
-        NextBlock {
-            rays: records8(simd, [ox, oy, oz, end, dx, dy, dz, zero]),
-            states: records8(simd, [r, g, b, next.pdf, x, y, z, next.eta_squared]),
-            normals: simd.records16([nx, ny, nz, zero]),
-            exists: next.exists.bits(),
-        }
+        let block = self.1;
+        simd.octets16([ox, oy, oz, end, dx, dy, dz, zero], &mut block.rays);
+        simd.octets16([r, g, b, next.pdf, x, y, z, next.eta_squared], &mut block.states);
+        block.normals = simd.records16([nx, ny, nz, zero]);
+        block.exists = next.exists.bits();
     }
 }

@@ -1,7 +1,7 @@
 //! Rays of a pinhole camera through sixteen points of the picture.
 
+use super::Row;
 use super::vector::{add, length, scale};
-use super::{Row, records8};
 use crate::lanes::{Lanes, Simd};
 use crate::level::{Kernel, Level};
 
@@ -33,9 +33,9 @@ fn direction<L: Lanes>(camera: &CameraRays, axes: [[L; 3]; 3], [x, y]: [L; 2]) -
 }
 
 impl CameraRays<'_> {
-    /// Rays by the instructions of `level`: origin, infinity, unit direction, zero.
-    pub fn compute(&self, level: Level) -> [[f32; 8]; 16] {
-        level.dispatch(CameraKernel(self))
+    /// Rays by the instructions of `level`, into `rays`: origin, infinity, unit direction, zero.
+    pub fn compute(&self, level: Level, rays: &mut [[f32; 8]; 16]) {
+        level.dispatch(CameraKernel(self, rays));
     }
 
     /// Scalar reference; equals [`CameraRays::compute`] to the bit.
@@ -48,13 +48,13 @@ impl CameraRays<'_> {
     }
 }
 
-struct CameraKernel<'k, 'b>(&'k CameraRays<'b>);
+struct CameraKernel<'k, 'b>(&'k CameraRays<'b>, &'k mut [[f32; 8]; 16]);
 
 impl Kernel for CameraKernel<'_, '_> {
-    type Out = [[f32; 8]; 16];
+    type Out = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> [[f32; 8]; 16] {
+    fn run<S: Simd>(self, simd: S) {
         let all = |value: f32| simd.splat16(value);
         let [right, up, forward] = self.0.axes;
         let axes = [
@@ -66,6 +66,6 @@ impl Kernel for CameraKernel<'_, '_> {
         let [x, y, z] = direction(self.0, axes, [simd.load16(&raster[0]), simd.load16(&raster[1])]);
         let [ex, ey, ez] = self.0.eye;
         let (end, zero) = (all(f32::INFINITY), all(0.0));
-        records8(simd, [all(ex), all(ey), all(ez), end, x, y, z, zero])
+        simd.octets16([all(ex), all(ey), all(ez), end, x, y, z, zero], self.1);
     }
 }

@@ -34,19 +34,3 @@ pub type Row3 = [Row; 3];
 fn load3<S: Simd>(simd: S, [x, y, z]: &Row3) -> [S::F16; 3] {
     [simd.load16(x), simd.load16(y), simd.load16(z)]
 }
-
-/// Eight registers of sixteen, as sixteen records of eight floats.
-#[inline(always)]
-fn records8<S: Simd>(simd: S, [a, b, c, d, e, f, g, h]: [S::F16; 8]) -> [[f32; 8]; 16] {
-    let (first, second) = (simd.records16([a, b, c, d]), simd.records16([e, f, g, h]));
-    let mut records = [[0.0; 8]; 16];
-    #[allow(
-        clippy::needless_range_loop,
-        reason = "iterators would be calls without the level's instructions"
-    )]
-    for i in 0..16 {
-        let ([a, b, c, d], [e, f, g, h]) = (first[i], second[i]);
-        records[i] = [a, b, c, d, e, f, g, h];
-    }
-    records
-}

@@ -3,7 +3,9 @@
 use core::hint::black_box;
 use halflight_core::Level;
 use halflight_core::sampling::{mix, unit_float};
-use halflight_simd::kernels::shade::bsdf::{BsdfBlock, Direct, LightBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::bsdf::{
+    BsdfBlock, Direct, LightBlock, NextBlock, Scatter, ScatterBlock, ShadowBlock,
+};
 use halflight_simd::kernels::shade::camera::CameraRays;
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
@@ -136,7 +138,12 @@ impl Block {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
         let raster = &self.raster;
         let rays = CameraRays { eye: [0.0; 3], axes, pixel: 0.002, half: [320.0, 240.0], raster };
-        black_box(level.map_or_else(|| rays.reference(), |level| rays.compute(level)));
+        let mut out = [[0.0; 8]; 16];
+        match level {
+            None => out = rays.reference(),
+            Some(level) => rays.compute(level, &mut out),
+        }
+        black_box(&out);
     }
 
     fn surface(&self, level: Option<Level>) {
@@ -147,7 +154,7 @@ impl Block {
             None => block = surfaces.reference(),
             Some(level) => surfaces.compute(level, &mut block),
         }
-        black_box(block);
+        black_box(&block);
     }
 
     fn numbers(&self, level: Option<Level>) {
@@ -157,7 +164,7 @@ impl Block {
             None => numbers = samples.reference(OFFSETS, true),
             Some(level) => samples.vertices(level, OFFSETS, true, &mut numbers),
         }
-        black_box(numbers);
+        black_box(&numbers);
     }
 
     fn light(&self, level: Option<Level>) {
@@ -181,7 +188,12 @@ impl Block {
             pdf: &self.ones[0],
             throughput: &self.ones,
         };
-        black_box(level.map_or_else(|| direct.reference(), |level| direct.compute(level)));
+        let mut block = ShadowBlock::EMPTY;
+        match level {
+            None => block = direct.reference(),
+            Some(level) => direct.compute(level, &mut block),
+        }
+        black_box(&block);
     }
 
     fn scatter(&self, bsdf: usize, level: Option<Level>) {
@@ -196,6 +208,11 @@ impl Block {
             eta_squared: &self.ones[0],
             active: 0xffff,
         };
-        black_box(level.map_or_else(|| scatter.reference(), |level| scatter.compute(level)));
+        let mut block = NextBlock::EMPTY;
+        match level {
+            None => block = scatter.reference(),
+            Some(level) => scatter.compute(level, &mut block),
+        }
+        black_box(&block);
     }
 }
