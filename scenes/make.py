@@ -64,12 +64,12 @@ class Mesh:
         path.write_text("\n".join(lines) + "\n")
 
 
-def cornell(name="cornell", back="white"):
+def cornell(name="cornell", back="white", floor="white", tall_block="white"):
     """The measured box; x to the left of the picture, z into it. The lamp hangs half a unit below the ceiling,
     which would hide it otherwise. `back` is the material of the wall at the back."""
     mesh = Mesh()
     for material, corners in [
-        ("white", "552.8 0 0  0 0 0  0 0 559.2  549.6 0 559.2"),
+        (floor, "552.8 0 0  0 0 0  0 0 559.2  549.6 0 559.2"),
         ("white", "556 548.8 0  556 548.8 559.2  0 548.8 559.2  0 548.8 0"),
         (back, "549.6 0 559.2  0 0 559.2  0 548.8 559.2  556 548.8 559.2"),
         ("green", "0 0 559.2  0 0 0  0 548.8 0  0 548.8 559.2"),
@@ -80,11 +80,13 @@ def cornell(name="cornell", back="white"):
         mesh.face(material, [values[i : i + 3] for i in range(0, 12, 3)])
     short = [(130, 65), (82, 225), (240, 272), (290, 114)]
     tall = [(423, 247), (265, 296), (314, 456), (472, 406)]
-    for height, base in (165, short), (330, tall):
-        mesh.face("white", [(x, height, z) for x, z in base])
+    for height, base, material in (165, short, "white"), (330, tall, tall_block):
+        mesh.face(material, [(x, height, z) for x, z in base])
         for (x0, z0), (x1, z1) in zip(base, base[1:] + base[:1]):
-            mesh.face("white", [(x0, 0, z0), (x1, 0, z1), (x1, height, z1), (x0, height, z0)])
+            mesh.face(material, [(x0, 0, z0), (x1, 0, z1), (x1, height, z1), (x0, height, z0)])
     as_what = "as measured" if back == "white" else f"with a {back} back wall"
+    if floor != "white":
+        as_what = f"with a floor of {floor} and a block of {tall_block}"
     mesh.write(HERE / f"cornell/{name}.obj", f"{name}.mtl", f"The Cornell box {as_what}.")
 
 
@@ -169,6 +171,7 @@ def mesh_is_at(mesh, face, x):
 if __name__ == "__main__":
     cornell()
     cornell("dark-wall", back="black")
+    cornell("rough", floor="metal", tall_block="plastic")
     sphere()
     caustic()
     glossy()

@@ -4,9 +4,10 @@
 #[path = "room/mod.rs"]
 mod room;
 
-use halflight_core::bsdf::DiffuseOnly;
+use halflight_core::bsdf::{DiffuseOnly, Only};
 use halflight_core::bvh::Bvh;
 use halflight_core::cache::irradiance::Metric;
+use halflight_core::cache::radiance::LobeSettings;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Buffer, Line, OutOfMemory};
 use halflight_core::method::bidirectional::{Bidirectional, BidirectionalSettings};
@@ -23,12 +24,25 @@ use halflight_core::{Level, Rgb};
 /// Pixels across and down.
 pub const SIZE: usize = 32;
 /// Methods by their names on the command line.
-pub const METHODS: [&str; 9] =
-    ["path", "light", "sppm", "bdpt", "photon-map", "vcm", "instant-radiosity", "mlt", "irradiance-cache"];
+pub const METHODS: [&str; 10] = [
+    "path",
+    "light",
+    "sppm",
+    "bdpt",
+    "photon-map",
+    "vcm",
+    "instant-radiosity",
+    "mlt",
+    "irradiance-cache",
+    "radiance-cache",
+];
 /// Cache lines that all structures of any method take together.
 pub const LINES: usize = 1 << 16;
 /// Bytes of working memory at most.
 const SCRATCH: usize = 640 << 10;
+
+/// Kinds of surfaces of the room with a wall of metal.
+type WithMetal = Only<false, true, false, false, false>;
 
 /// Renders the room by method number `method` into `pixels`, row by row from the top, all structures in
 /// `memory`.
@@ -37,7 +51,13 @@ pub fn render(
     memory: &mut [Line],
     pixels: &mut [Rgb; SIZE * SIZE],
 ) -> Result<(), OutOfMemory> {
-    let (scene, size) = (room::scene(), SIZE as u32);
+    let (mut scene, size) = (room::scene(), SIZE as u32);
+    // Radiance records serve wide lobes.
+    let lobes = (method == 9).then_some(LobeSettings { tolerance: 0.05, degree: 2 });
+    let materials = room::with_metal_wall();
+    if lobes.is_some() {
+        scene.materials = &materials;
+    }
     let mut arena = Arena::over(memory);
     let bvh = Bvh::build(&scene.mesh, &mut arena)?;
     let lights = LightSampler::build(&scene, &mut arena)?;
@@ -65,6 +85,7 @@ pub fn render(
         fewest: 256,
         reserve: 0,
         widens: true,
+        lobes,
     };
     let lights = VirtualLightSettings { light_paths: Some(1024), connections: None };
     let chains = MetropolisSettings::default();
@@ -83,6 +104,7 @@ pub fn render(
         )?,
         7 => run(Metropolis::<DiffuseOnly>::new(&context, &chains, memory, loops, 0)?, &mut state, loops)?,
         8 => run(IrradianceCaching::<DiffuseOnly>::new(&context, &cache, memory)?, &mut state, loops)?,
+        9 => run(IrradianceCaching::<WithMetal>::new(&context, &cache, memory)?, &mut state, loops)?,
         _ => run(Bidirectional::<DiffuseOnly>::new(&context, &counts, memory, loops, 0)?, &mut state, loops)?,
     }
     for (i, pixel) in pixels.iter_mut().enumerate() {

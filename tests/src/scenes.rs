@@ -183,6 +183,21 @@ pub fn cornell_box() -> SceneBuffers {
     scene
 }
 
+/// The Cornell box with a floor of metal, alpha 0.3, and a tall block of plastic, alpha 0.4, seen from above:
+/// records do not serve the lobes of grazing viewers.
+pub fn rough_box() -> SceneBuffers {
+    let mut buffers = cornell_box();
+    let (eye, target) = (Vec3::new(0.5, 0.9, 0.03), Vec3::new(0.5, 0.1, 0.6));
+    buffers.camera = Camera::look_at(eye, target, Vec3::Y, 75.0);
+    let of = |surface| Material { surface, ..Material::GREY };
+    let metal = buffers.material(of(metal(0.3f32.sqrt())));
+    let plastic = buffers.material(of(varnish(0.4f32.sqrt())));
+    let block = buffers.triangles.len() - 10;
+    buffers.triangles[..2].iter_mut().for_each(|triangle| triangle.material = metal);
+    buffers.triangles[block..].iter_mut().for_each(|triangle| triangle.material = plastic);
+    buffers
+}
+
 /// A lamp of side `size` in front of an object of `surface`, and a floor lit by both: a caustic if `surface`
 /// is specular, large enough for paths to find it.
 pub fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {

@@ -32,6 +32,7 @@ mod load_names;
 mod load_support;
 mod photon_map;
 mod picture;
+mod radiance_cache;
 mod report;
 mod reuse;
 mod sampling;

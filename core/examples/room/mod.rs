@@ -1,7 +1,7 @@
 //! The scene of the examples: a pyramid in a room under a lamp.
 use glam::Vec3;
 use halflight_core::Rgb;
-use halflight_core::scene::{Camera, ColorInput, Material, Mesh, Scene, Triangle};
+use halflight_core::scene::{Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Triangle};
 
 #[rustfmt::skip]
 const POSITIONS: [[f32; 3]; 15] = [
@@ -31,6 +31,16 @@ const MATERIALS: [Material; 4] = [
         ..Material::diffuse(Rgb::splat(0.7))
     },
 ];
+
+/// The materials with rough metal in place of red.
+#[allow(dead_code, reason = "not all examples need it")]
+pub(super) fn with_metal_wall() -> [Material; 4] {
+    let mut materials = MATERIALS;
+    let reflectance = ColorInput { value: Rgb::splat(0.9), texture: None };
+    let roughness = ScalarInput { value: 0.85, texture: None };
+    materials[1].surface = Surface::Conductor { reflectance, roughness };
+    materials
+}
 
 /// The room, seen through its open front.
 pub(super) fn scene() -> Scene<'static> {

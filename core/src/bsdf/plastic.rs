@@ -62,6 +62,16 @@ impl Plastic {
         (self.base != Rgb::ZERO).then(|| CoatTransmittance::dielectric(self.alpha, self.eta))
     }
 
+    /// Index of refraction of the coat.
+    pub(super) fn eta(&self) -> f32 {
+        self.eta
+    }
+
+    /// Factor on the coat's Fresnel reflectance; `None` with metal.
+    pub(super) fn coat_tint(&self) -> Option<Rgb> {
+        (self.metallic == 0.0).then_some(self.coat)
+    }
+
     pub(super) fn is_delta(&self) -> bool {
         self.alpha == 0.0 && self.base == Rgb::ZERO
     }

@@ -6,11 +6,13 @@
 //! they are frozen. Paths go on where no record is valid.
 
 use super::executor::{Executor, Passed};
-use super::record_placement::{CacheBuilder, RecordPlacement, step_footprint, step_points};
+use super::record_placement::{CacheBuilder, LobeGathering, RecordPlacement, step_footprint, step_points};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
+use crate::cache::radiance::{LobeSettings, PooledRecord, ServedLobes};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
+use crate::scene::Scene;
 use crate::transport::cached::gather::GatherPoint;
 use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 
@@ -45,12 +47,34 @@ pub struct CacheSettings {
     pub reserve: usize,
     /// True if records become wider where there was no time to fill the caches.
     pub widens: bool,
+    /// Lobes that records serve; `None` for irradiance alone.
+    pub lobes: Option<LobeSettings>,
 }
 
 impl CacheSettings {
     /// Strata along a side behind rough surfaces, of which a pixel sees the mean.
     fn coarse(&self) -> usize {
         self.strata.div_ceil(2 * BLOCK) * BLOCK
+    }
+
+    /// Strata along a side for records with coefficients.
+    fn lobe_strata(&self) -> usize {
+        self.lobes.map_or(0, |lobes| lobes.strata().max(self.strata))
+    }
+
+    /// Degree of the coefficients at most, if records have any.
+    pub fn degree(&self) -> Option<usize> {
+        self.lobes.map(|lobes| lobes.degree)
+    }
+
+    /// Bytes of the tables of lobes in `scene`, and of their strata.
+    pub fn lobe_footprint(&self, scene: &Scene) -> Footprint {
+        match self.lobes {
+            Some(LobeSettings { degree, .. }) => {
+                ServedLobes::footprint(scene).and(LobeGathering::footprint(self.lobe_strata(), degree))
+            }
+            None => Footprint::default(),
+        }
     }
 
     /// Bytes of the tables of strata, and of the points of placement.
@@ -69,6 +93,7 @@ pub struct IrradianceCaching<'a, F> {
     size: [u32; 2],
     builders: [CacheBuilder<'a>; 2],
     step: &'a mut [GatherPoint],
+    lobes: Option<LobeGathering<'a>>,
     widens: bool,
     is_frozen: bool,
     is_cut: bool,
@@ -77,7 +102,9 @@ pub struct IrradianceCaching<'a, F> {
 impl<'a, F: Features> IrradianceCaching<'a, F> {
     /// Working memory of a worker, for paths and for gather rays, both with photons of caustics.
     pub fn scratch(settings: &CacheSettings) -> Footprint {
-        let gathering = PathIntegrator::<F>::gather_scratch_with::<((), CausticMerging)>(settings.strata);
+        let gathering = PathIntegrator::<F>::gather_scratch_with::<((), CausticMerging)>(
+            settings.strata.max(settings.lobe_strata()),
+        );
         PathIntegrator::<F>::scratch_with::<((), CausticMerging), ()>(WAVE).or(gathering)
     }
 
@@ -94,15 +121,27 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         let coarse = CellFlux::build(settings.coarse(), &mut arena)?;
         let flux = [CellFlux::build(settings.strata, &mut arena)?, coarse];
         let step = step_points(&mut arena)?;
+        let lobes = match &settings.lobes {
+            Some(lobes) if F::GLOSSY => {
+                let mut arena = memory.take("radiance", settings.lobe_footprint(context.scene))?;
+                let served = ServedLobes::build(context.scene, lobes, &mut arena)?;
+                served
+                    .map(|served| LobeGathering::new(served, settings.lobe_strata(), &mut arena))
+                    .transpose()?
+            }
+            _ => None,
+        };
+        let served = lobes.as_ref().map(|gathering| *gathering.lobes());
+        let degree = served.as_ref().map(ServedLobes::degree);
 
         let available = memory.available().saturating_sub(settings.reserve);
         let wanted = (context.pixels() / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
         let wanted = wanted.saturating_add(settings.fewest);
-        let capacity = wanted.min(CacheBuilder::capacity_of(available / 2)).max(settings.fewest);
+        let capacity = wanted.min(CacheBuilder::capacity_of(available / 2, degree)).max(settings.fewest);
         let bounds = context.bvh.bounds();
         let mut builder = |index| {
-            let mut arena = memory.take("cache", CacheBuilder::footprint(capacity))?;
-            CacheBuilder::new(&bounds, capacity, index, &mut arena)
+            let mut arena = memory.take("cache", CacheBuilder::footprint(capacity, degree))?;
+            CacheBuilder::new(&bounds, capacity, index, served, &mut arena)
         };
         let builders = [builder(0)?, builder(1)?];
         let usual = metric::Settings::new(settings.metric, 0.5 * bounds.diagonal());
@@ -113,6 +152,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             size: [context.settings.width, context.settings.height],
             builders,
             step,
+            lobes,
             widens: settings.widens,
             is_frozen: false,
             is_cut: false,
@@ -132,6 +172,13 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         }
     }
 
+    /// Restores coefficients of the records of [`IrradianceCaching::restore`], and their registers.
+    pub fn restore_coefficients(&mut self, coefficients: [(&[PooledRecord], &[[u16; 16]]); 2]) {
+        for (builder, (records, registers)) in self.builders.iter_mut().zip(coefficients) {
+            builder.cache.restore_coefficients(records, registers);
+        }
+    }
+
     /// Leaves the caches as they are.
     pub fn finish(&mut self) {
         self.builders.iter_mut().for_each(CacheBuilder::finish);
@@ -140,6 +187,11 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
     /// The caches of even and of odd samples.
     pub fn caches(&self) -> [&IrradianceCache<'a>; 2] {
         self.builders.each_ref().map(|builder| &builder.cache)
+    }
+
+    /// Gathering of records that serve lobes, if the scene has such lobes.
+    pub fn lobes(&self) -> Option<&LobeGathering<'a>> {
+        self.lobes.as_ref()
     }
 
     /// Points at which light was gathered for each of them.
@@ -192,6 +244,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             least_pixels: LEAST_PIXELS,
             size: self.size,
             step: &mut *self.step,
+            lobes: self.lobes.as_mut(),
         };
         let Round { executor, state, .. } = round;
         let Passed { counters, is_complete } = executor.timed("cache", |executor| {
@@ -252,10 +305,11 @@ mod tests {
         fewest: 1000,
         reserve: 0,
         widens: true,
+        lobes: None,
     };
 
     fn lines() -> usize {
-        let caches = CacheBuilder::footprint(SETTINGS.fewest);
+        let caches = CacheBuilder::footprint(SETTINGS.fewest, None);
         let film = RenderState::footprint(SIDE, SIDE);
         let all = Caching::scratch(&SETTINGS).and(film).and(SETTINGS.gathering_footprint());
         all.and(caches).and(caches).bytes() / 64

@@ -9,6 +9,7 @@
 use super::executor::{Executor, Passed};
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
+use crate::cache::radiance::{PooledRecord, RecordCoefficients, ServedLobes, StrataTables, registers_of};
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::cached::gather::{GatherPoint, Gathering};
@@ -65,21 +66,27 @@ pub struct CacheBuilder<'m> {
 }
 
 impl<'m> CacheBuilder<'m> {
-    /// Bytes for `capacity` records.
-    pub fn footprint(capacity: usize) -> Footprint {
-        IrradianceCache::footprint(capacity).slice::<f32>(capacity).slice::<GatherPoint>(capacity)
+    /// Bytes for `capacity` records, with coefficients up to `degree` if there is one.
+    pub fn footprint(capacity: usize, degree: Option<usize>) -> Footprint {
+        let records =
+            IrradianceCache::footprint(capacity).slice::<f32>(capacity).slice::<GatherPoint>(capacity);
+        match degree {
+            Some(degree) => records.and(RecordCoefficients::footprint(capacity, degree)),
+            None => records,
+        }
     }
 
     /// Number of records that fit into `bytes`.
-    pub fn capacity_of(bytes: usize) -> usize {
+    pub fn capacity_of(bytes: usize, degree: Option<usize>) -> usize {
         let mut capacity = IrradianceCache::capacity_of(bytes);
-        while capacity > 0 && Self::footprint(capacity).bytes() > bytes {
+        while capacity > 0 && Self::footprint(capacity, degree).bytes() > bytes {
             capacity -= 1 + capacity / 64;
         }
         capacity
     }
 
-    /// An empty cache, number 0 or 1, of a scene within `bounds`, with memory for `capacity` records.
+    /// An empty cache, number 0 or 1, of a scene within `bounds`, with memory for `capacity` records, which
+    /// serve `lobes`.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `arena` has less than [`CacheBuilder::footprint`].
@@ -87,10 +94,14 @@ impl<'m> CacheBuilder<'m> {
         bounds: &Bounds,
         capacity: usize,
         index: u32,
+        lobes: Option<ServedLobes<'m>>,
         arena: &mut Arena<'m>,
     ) -> Result<Self, OutOfMemory> {
+        let cache = IrradianceCache::new(bounds, capacity, arena)?;
+        let (efforts, points) = (arena.slice(capacity)?, arena.slice(capacity)?);
+        let coefficients = lobes.map(|lobes| RecordCoefficients::new(lobes, capacity, arena)).transpose()?;
         Ok(Self {
-            cache: IrradianceCache::new(bounds, capacity, arena)?,
+            cache: cache.with_coefficients(coefficients),
             index,
             via: Some(Via::Specular),
             next: 0,
@@ -98,8 +109,8 @@ impl<'m> CacheBuilder<'m> {
             before: 0,
             gathered: 0,
             restored: 0,
-            efforts: arena.slice(capacity)?,
-            points: arena.slice(capacity)?,
+            efforts,
+            points,
         })
     }
 
@@ -174,13 +185,24 @@ impl<'m> CacheBuilder<'m> {
 
     /// True if nothing is to be gathered at `point`, for records of at least `least_pixels` pixels.
     fn is_served(&self, point: &GatherPoint, least_pixels: f32) -> bool {
-        self.cache.is_full() || point.is_confined(least_pixels) || self.cache.covers(&point.query())
+        let covers = |query| match point.has_lobe() {
+            true => self.cache.covers_lobe(query),
+            false => self.cache.covers(query),
+        };
+        self.cache.is_full() || point.is_confined(least_pixels) || covers(&point.query())
     }
 
-    /// Commits the record of `point`.
-    fn insert(&mut self, record: Record, effort: f32, point: GatherPoint) {
+    /// Commits the record of `point`, with coefficients in `registers` if it has any.
+    fn insert(
+        &mut self,
+        (record, coefficients): (Record, PooledRecord),
+        registers: &[[u16; 16]],
+        effort: f32,
+        point: GatherPoint,
+    ) {
         let index = self.cache.records().len();
-        if self.cache.insert(record)
+        let coefficients = coefficients.is_some().then_some((&coefficients, registers));
+        if self.cache.insert_with(record, coefficients)
             && let Some((of_effort, of_point)) = self.efforts.get_mut(index).zip(self.points.get_mut(index))
         {
             (*of_effort, *of_point) = (effort, point);
@@ -230,6 +252,46 @@ pub struct RecordPlacement<'p, 'a, F> {
     pub size: [u32; 2],
     /// [`step_points`].
     pub step: &'p mut [GatherPoint],
+    /// Gathering of records with coefficients, if some lobes are served.
+    pub lobes: Option<&'p mut LobeGathering<'a>>,
+}
+
+/// Gathering of records with coefficients of the incident radiance.
+pub struct LobeGathering<'m> {
+    lobes: ServedLobes<'m>,
+    /// Tables for the number of strata.
+    flux: CellFlux<'m>,
+    strata: StrataTables<'m>,
+    /// Registers of the points between two commits.
+    registers: &'m mut [[u16; 16]],
+}
+
+impl<'m> LobeGathering<'m> {
+    /// Bytes for n × n strata and coefficients up to `degree`.
+    pub fn footprint(n: usize, degree: usize) -> Footprint {
+        let tables = CellFlux::footprint(n).and(StrataTables::footprint(n, degree));
+        tables.slice::<[u16; 16]>(MOST_POINTS * registers_of(degree))
+    }
+
+    /// Gathering for `lobes` with n × n strata.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `arena` has less than [`LobeGathering::footprint`].
+    pub fn new(lobes: ServedLobes<'m>, n: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let degree = lobes.degree();
+        let (flux, strata) = (CellFlux::build(n, arena)?, StrataTables::build(n, degree, arena)?);
+        Ok(Self { lobes, flux, strata, registers: arena.slice(MOST_POINTS * registers_of(degree))? })
+    }
+
+    /// Lobes that records serve.
+    pub fn lobes(&self) -> &ServedLobes<'m> {
+        &self.lobes
+    }
+
+    /// Gather rays of a record with coefficients.
+    pub fn rays(&self) -> usize {
+        self.strata.n() * self.strata.n()
+    }
 }
 
 impl<F: Features> RecordPlacement<'_, '_, F> {
@@ -299,6 +361,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
             }
             Ok(counters)
         })?;
+        builder.cache.widen_coefficients(factor);
         builder.cache.rebuild();
         counters += passed.counters;
         Ok(Passed { counters, ..passed })
@@ -349,12 +412,14 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         counters: &mut Counters,
     ) -> Result<Option<usize>, OutOfMemory> {
         let (order, integrator) = (self.order(), self.integrator);
+        let lobes = self.lobes.as_ref().map(|gathering| gathering.lobes);
         let leave_out = |points: &mut [GatherPoint]| {
             points.iter_mut().filter(|point| !is_wanted(point)).for_each(|point| *point = GatherPoint::NONE);
         };
         let passed = executor.pass(self.step.chunks_mut(PIXELS), |task, points, _| {
             let mut counters = Counters::default();
-            integrator.places(&order, first + (task * PIXELS) as u64, target, points, &mut counters);
+            let first = first + (task * PIXELS) as u64;
+            integrator.places_with(&order, first, target, lobes.as_ref(), points, &mut counters);
             leave_out(points);
             integrator.measure_overhangs(points, &mut counters);
             leave_out(points);
@@ -367,7 +432,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
     /// Gathers at these points of the step, at most [`MOST_POINTS`], and commits the records in their order.
     /// Returns whether that is done.
     fn gather(
-        &self,
+        &mut self,
         points: core::ops::Range<usize>,
         builder: &mut CacheBuilder,
         executor: &mut impl Executor,
@@ -381,15 +446,30 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         let integrator = self.integrator.with_growing_cache(&builder.cache);
         let number = |point: usize| 2 * (builder.gathered + point as u32) + builder.index;
         let mut found = [None; MOST_POINTS];
-        let passed = executor.pass(points.iter().zip(&mut found), |i, (point, found), worker| {
+        let (lobes, registers) = match self.lobes.as_deref_mut() {
+            Some(LobeGathering { flux, strata, registers, .. }) => {
+                (Some((&*flux, &*strata)), &mut **registers)
+            }
+            None => (None, Default::default()),
+        };
+        let stride = lobes.map_or(1, |(_, strata)| registers_of(strata.degree()));
+        let mut staged = registers.chunks_mut(stride);
+        let pieces = points.iter().zip(&mut found).map(|piece| (piece, staged.next().unwrap_or_default()));
+        let passed = executor.pass(pieces, |i, ((point, found), registers), worker| {
             let mut counters = Counters::default();
             let scratch = &mut worker.scratch;
+            let (gathering, strata) = match lobes.filter(|_| point.has_lobe()) {
+                Some((flux, strata)) => (Gathering { flux, ..gathering }, Some((strata, registers))),
+                None => (gathering, None),
+            };
             let record = match self.photons {
                 Some(photons) => {
                     let integrator = integrator.with_caustics(photons);
-                    integrator.gather(point, number(i), &gathering, scratch, &mut counters)?
+                    integrator.gather_with(point, number(i), &gathering, strata, scratch, &mut counters)?
                 }
-                None => integrator.gather(point, number(i), &gathering, scratch, &mut counters)?,
+                None => {
+                    integrator.gather_with(point, number(i), &gathering, strata, scratch, &mut counters)?
+                }
             };
             let effort = counters.rays as f32 / counters.paths.max(1) as f32;
             *found = record.map(|record| (record, effort));
@@ -398,9 +478,12 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         *counters += passed.counters;
         if passed.is_complete {
             builder.gathered += points.len() as u32;
+            let registers = self.lobes.as_ref().map_or(&[][..], |gathering| &*gathering.registers);
+            let mut staged = registers.chunks(stride);
             for (found, point) in found.into_iter().zip(points) {
+                let registers = staged.next().unwrap_or_default();
                 if let Some((record, effort)) = found {
-                    builder.insert(record, effort, *point);
+                    builder.insert(record, registers, effort, *point);
                 }
             }
         }

@@ -9,8 +9,8 @@ use clap::{Args, ValueEnum};
 use halflight::load::{LoadOptions, LoadedScene};
 use halflight::memory::Budget;
 use halflight::render::{
-    BidirectionalSettings, CacheSettings, Method, MetropolisSettings, PhotonSettings, PrimarySpace,
-    RenderError, Settings, Stop, VirtualLightSettings,
+    BidirectionalSettings, CacheSettings, LobeSettings, Method, MetropolisSettings, PhotonSettings,
+    PrimarySpace, RenderError, Settings, Stop, VirtualLightSettings,
 };
 use halflight::report::quantity::readable_bytes;
 use halflight::save::Image;
@@ -175,6 +175,13 @@ pub(super) struct MethodArgs {
     /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: 256]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
+    /// Expected error of the light from a lobe that records serve, relative to all that leaves [default: 0.02]
+    #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Radiance cache")]
+    lobe_error: Option<f64>,
+    /// Largest degree of the coefficients of a record; lobes that need more are path traced [default: 6]
+    #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(1..=8),
+        help_heading = "Radiance cache")]
+    lobe_degree: Option<u32>,
     /// Kernel of density estimates [default: epanechnikov]
     #[arg(long, value_name = "KERNEL", help_heading = "Photons")]
     photon_kernel: Option<Kernel>,
@@ -281,6 +288,10 @@ impl MethodArgs {
                 metric: self.cache_metric.unwrap_or(settings.cache.metric),
                 error: self.cache_error.map(|error| error as f32),
                 strata: self.cache_rays.map(u32::isqrt),
+            },
+            lobes: LobeSettings {
+                tolerance: self.lobe_error.map_or(settings.lobes.tolerance, |error| error as f32),
+                degree: self.lobe_degree.map_or(settings.lobes.degree, |degree| degree as usize),
             },
             photons: PhotonSettings { kernel, global: self.global_photons, caustic: self.caustic_photons },
             bidirectional: BidirectionalSettings {

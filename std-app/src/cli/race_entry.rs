@@ -87,8 +87,8 @@ mod tests {
     #[test]
     fn invalid_entries_name_the_reason() {
         for (text, reason) in [
-            ("", "the methods are auto, path, irradiance-cache, photon-map, sppm"),
-            ("paths", "the methods are auto, path, irradiance-cache, photon-map, sppm"),
+            ("", "the methods are auto, path, irradiance-cache, radiance-cache, photon-map"),
+            ("paths", "the methods are auto, path, irradiance-cache, radiance-cache, photon-map"),
             (
                 "path:sparkle=1",
                 "there is no option `sparkle`; the options are caustics, reuse, windows, max-depth",

@@ -1,10 +1,13 @@
-//! Irradiance cache files: gathered once, reused for other views of the scene. Format: docs/cache-file.md.
+//! Files of irradiance and radiance caches: gathered once, reused for other views of the scene. Format: docs/cache-file.md.
 
 use super::error::FileError;
 use super::sealed::{self, Kind};
+use super::{LobeSettings, Method};
 use super::{Settings, fingerprint};
 use crate::save::Patience;
+use bytemuck::Pod;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
+use halflight_core::cache::radiance::PooledRecord;
 use halflight_core::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -26,6 +29,9 @@ struct Identity {
     error: String,
     /// Gather rays per record.
     rays: u32,
+    /// Lobes that records serve, with a radiance cache.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    lobes: Option<String>,
 }
 
 impl Identity {
@@ -37,6 +43,10 @@ impl Identity {
             metric: settings.cache.metric.name().into(),
             error: format!("{:e}", settings.cache.allowed()),
             rays: settings.cache.strata().pow(2),
+            lobes: (settings.method == Some(Method::RadianceCache)).then(|| {
+                let LobeSettings { tolerance, degree } = settings.lobes;
+                format!("zernike, lobe-degree {degree}, lobe-error {tolerance:e}")
+            }),
         }
     }
 
@@ -52,6 +62,10 @@ impl Identity {
             .or(said("cache-metric", self.metric.clone(), other.metric.clone()))
             .or(said("cache-error", self.error.clone(), other.error.clone()))
             .or(said("cache-rays", self.rays.to_string(), other.rays.to_string()))
+            .or_else(|| {
+                let lobes = |lobes: &Option<String>| lobes.clone().unwrap_or_else(|| "none".into());
+                said("coefficients", lobes(&self.lobes), lobes(&other.lobes))
+            })
     }
 }
 
@@ -82,6 +96,44 @@ pub(super) struct Half {
     pub(super) records: u32,
     /// Places gathered so far, which number the random streams of gather rays.
     pub(super) gathered: u32,
+    /// Registers of the coefficients; none without a radiance cache.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(super) registers: u32,
+}
+
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
+impl Half {
+    /// Counts of `cache`, for which light was gathered at `gathered` places.
+    pub(super) fn of(cache: &IrradianceCache, gathered: u32) -> Self {
+        let registers = cache.coefficients().map_or(0, |known| known.pool().registers().len());
+        Self { records: cache.records().len() as u32, gathered, registers: registers as u32 }
+    }
+
+    /// Number of records that may have coefficients.
+    fn with_coefficients(&self) -> usize {
+        if self.registers > 0 { self.records as usize } else { 0 }
+    }
+
+    /// Bytes of its sections.
+    pub(super) fn bytes(&self) -> u64 {
+        let records = u64::from(self.records) * size_of::<Record>() as u64;
+        let pooled = (self.with_coefficients() * size_of::<PooledRecord>()) as u64;
+        records + pooled + u64::from(self.registers) * size_of::<Register>() as u64
+    }
+}
+
+/// Sixteen half floats of coefficients.
+type Register = [u16; 16];
+
+/// Content of one of the two caches in a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Loaded {
+    pub(super) records: Vec<Record>,
+    pub(super) coefficients: Vec<PooledRecord>,
+    pub(super) registers: Vec<Register>,
 }
 
 /// Header of a cache file.
@@ -99,9 +151,9 @@ impl Header {
         Self { identity: Identity::of(scene, settings), views: Vec::new(), halves: [Half::default(); 2] }
     }
 
-    /// Records of both halves.
-    pub(super) fn records(&self) -> usize {
-        self.halves.iter().map(|half| half.records as usize).sum()
+    /// Bytes of both halves.
+    pub(super) fn bytes(&self) -> u64 {
+        self.halves.iter().map(Half::bytes).sum()
     }
 
     /// Whether the cache is complete for `view`.
@@ -130,8 +182,19 @@ pub(super) fn write(
     patience: Patience,
 ) -> Result<(), FileError> {
     sealed::write(path, &KIND, header, patience, |file| {
-        let mut sections = caches.iter().flat_map(|cache| cache.records().chunks(AT_ONCE));
-        sections.try_for_each(|records| file.put(bytemuck::cast_slice(records)))
+        for (cache, half) in caches.iter().zip(&header.halves) {
+            for records in cache.records().chunks(AT_ONCE) {
+                file.put(bytemuck::cast_slice(records))?;
+            }
+            let Some(known) = cache.coefficients() else { continue };
+            for records in known.records(half.with_coefficients()).chunks(AT_ONCE) {
+                file.put(bytemuck::cast_slice(records))?;
+            }
+            for registers in known.pool().registers().chunks(AT_ONCE) {
+                file.put(bytemuck::cast_slice(registers))?;
+            }
+        }
+        Ok(())
     })
 }
 
@@ -162,37 +225,56 @@ impl<'r> Reader<'r> {
     }
 
     fn new((file, header): (sealed::Reader<'r>, Header)) -> Result<Self, FileError> {
-        let records: u64 = header.halves.iter().map(|half| u64::from(half.records)).sum();
-        file.expect(records * size_of::<Record>() as u64, 1)?;
+        file.expect(header.bytes(), 1)?;
         Ok(Self { file, header })
     }
 
-    /// Records of both caches.
-    pub(super) fn records(mut self) -> Result<[Vec<Record>; 2], FileError> {
+    /// Content of both caches.
+    pub(super) fn load(mut self) -> Result<[Loaded; 2], FileError> {
         let halves = [self.half(0)?, self.half(1)?];
-        if !halves.iter().flatten().all(is_sound) {
+        if !halves.iter().flat_map(|half| &half.records).all(is_sound) {
             return Err(self.file.damage("it has a record that cannot be"));
+        }
+        let has_sound_coefficients = |half: &Loaded| {
+            let registers = half.registers.len();
+            half.coefficients.iter().all(|record| record.is_sound(registers))
+                && half.registers.as_flattened().iter().all(|half| half & INFINITE != INFINITE)
+        };
+        if !halves.iter().all(has_sound_coefficients) {
+            return Err(self.file.damage("it has coefficients that cannot be"));
         }
         self.file.finish()?;
         Ok(halves)
     }
 
-    fn half(&mut self, half: usize) -> Result<Vec<Record>, FileError> {
-        let mut left = self.header.halves[half].records as usize;
-        let (mut records, mut section) = (Vec::new(), vec![Record::default(); AT_ONCE]);
-        let needed = left * size_of::<Record>();
-        if records.try_reserve_exact(left).is_err() {
+    fn half(&mut self, half: usize) -> Result<Loaded, FileError> {
+        let half = self.header.halves[half];
+        Ok(Loaded {
+            records: self.values(half.records as usize)?,
+            coefficients: self.values(half.with_coefficients())?,
+            registers: self.values(half.registers as usize)?,
+        })
+    }
+
+    /// Reads `left` values in sections.
+    fn values<T: Pod>(&mut self, mut left: usize) -> Result<Vec<T>, FileError> {
+        let (mut values, mut section) = (Vec::new(), vec![T::zeroed(); left.min(AT_ONCE)]);
+        let needed = left * size_of::<T>();
+        if values.try_reserve_exact(left).is_err() {
             return Err(self.file.refusal(format!("cannot be read: there are no {needed} bytes of memory")));
         }
         while left > 0 {
             let some = &mut section[..left.min(AT_ONCE)];
             self.file.get(bytemuck::cast_slice_mut(some))?;
-            records.extend_from_slice(some);
+            values.extend_from_slice(some);
             left -= some.len();
         }
-        Ok(records)
+        Ok(values)
     }
 }
+
+/// Exponent of an infinite half float, and of one that is no number.
+const INFINITE: u16 = 0x7c00;
 
 /// Whether a cache can hold this record.
 fn is_sound(record: &Record) -> bool {
@@ -217,7 +299,7 @@ fn is_sound(record: &Record) -> bool {
 pub fn inspect(bytes: &[u8]) -> Result<[usize; 2], FileError> {
     let file = (Box::new(bytes) as Box<dyn std::io::Read>, bytes.len() as u64);
     let reader = Reader::new(sealed::Reader::read(Path::new("cache"), &KIND, file, 1 << 30)?)?;
-    Ok(reader.records()?.map(|records| records.len()))
+    Ok(reader.load()?.map(|half| half.records.len()))
 }
 
 #[cfg(test)]
@@ -245,6 +327,7 @@ mod tests {
             metric: "halflight".into(),
             error: "1e-4".into(),
             rays: 1024,
+            lobes: None,
         }
     }
 
@@ -277,7 +360,7 @@ mod tests {
             cache.restore(records);
             cache
         });
-        let halves = counts.map(|records| Half { records, gathered: records + 1 });
+        let halves = counts.map(|records| Half { records, gathered: records + 1, registers: 0 });
         let header = Header { identity: identity(), views: Vec::new(), halves };
         let (even, odd) = (caches.next().unwrap(), caches.next().unwrap());
         write(&path, &header, [&even, &odd], Patience::least()).unwrap();
@@ -291,7 +374,7 @@ mod tests {
         assert_eq!(inspect(&bytes), Ok([5000, 3]));
         let reader = Reader::open(&path, &identity(), MOST).unwrap();
         assert_eq!(reader.header.halves.map(|half| half.gathered), [5001, 4]);
-        let [even, odd] = reader.records().unwrap();
+        let [even, odd] = reader.load().unwrap().map(|half| half.records);
         assert_eq!((even.len(), odd), (5000, [0, 1, 2].map(|i| record(i as f32 / 3.0)).to_vec()));
         std::fs::remove_file(path).unwrap();
     }
@@ -309,7 +392,7 @@ mod tests {
         }
         assert!(inspect(&[&bytes[..], b"x"].concat()).is_err());
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
-        let why = Reader::open(&path, &identity(), MOST).and_then(Reader::records).err().unwrap().to_string();
+        let why = Reader::open(&path, &identity(), MOST).and_then(Reader::load).err().unwrap().to_string();
         assert!(why.contains("damaged.cache: is damaged: it is too short"), "{why}");
         std::fs::remove_file(path).unwrap();
     }
@@ -339,6 +422,10 @@ mod tests {
             (moved, "is a cache of another scene, or its geometry and lights changed since"),
             (|identity| identity.max_depth = Some(3), "is a cache of max-depth no limit of, not 3"),
             (|identity| identity.rays = 256, "is a cache of cache-rays 1024, not 256"),
+            (
+                |identity| identity.lobes = Some("zernike, lobe-degree 6, lobe-error 2e-2".into()),
+                "is a cache of coefficients none, not zernike, lobe-degree 6, lobe-error 2e-2",
+            ),
         ] {
             assert!(refused(change).ends_with(words), "{}", refused(change));
         }

@@ -37,7 +37,9 @@ impl core::fmt::Display for RenderError {
             }
             Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
             Self::Shard => write!(f, "shard I/N is invalid: N must not exceed the number of tiles"),
-            Self::NoCache => write!(f, "only the method irradiance-cache has a cache to load or save"),
+            Self::NoCache => {
+                write!(f, "only the methods irradiance-cache and radiance-cache have a cache to load or save")
+            }
             Self::File(error) => error.fmt(f),
         }
     }

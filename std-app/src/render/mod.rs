@@ -45,7 +45,7 @@ pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
-pub use method::{CacheSettings, MapView, Method, PhotonSettings, PhotonView};
+pub use method::{CacheSettings, LobeSettings, MapView, Method, PhotonSettings, PhotonView};
 pub use radiance_study::{ALPHAS, BasisError, GradientError, study_bases, study_gradients};
 pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
@@ -79,6 +79,8 @@ pub struct Settings {
     pub caustics: bool,
     /// Settings of irradiance caches.
     pub cache: CacheSettings,
+    /// Lobes that the records of a radiance cache serve.
+    pub lobes: LobeSettings,
     /// Settings of photons.
     pub photons: PhotonSettings,
     /// Sample counts of the techniques of bidirectional methods.
@@ -145,6 +147,7 @@ impl Default for Settings {
             reuse: None,
             caustics: true,
             cache: CacheSettings::default(),
+            lobes: LobeSettings::default(),
             photons: PhotonSettings::default(),
             bidirectional: BidirectionalSettings::default(),
             virtual_lights: VirtualLightSettings::default(),

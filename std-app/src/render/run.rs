@@ -78,7 +78,7 @@ impl WithFeatures for Render<'_> {
         let of_film = resumed.as_ref().and_then(|film| film.header.method());
         let method = settings.method.or(of_film).unwrap_or(method);
         let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
-        if keeps_cache && method != Method::IrradianceCache {
+        if keeps_cache && !method.has_records() {
             return Err(RenderError::NoCache);
         }
         let identity =

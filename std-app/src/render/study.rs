@@ -117,13 +117,13 @@ impl Study<'_> {
         let flux = CellFlux::build(strata, &mut tables)?;
         let step = step_points(&mut tables)?;
         let capacity = (study.records as usize).saturating_mul(4);
-        let mut lines = memory.take("cache", CacheBuilder::footprint(capacity))?;
+        let mut lines = memory.take("cache", CacheBuilder::footprint(capacity, None))?;
         for &metric in &study.metrics {
             let usual = metric::Settings::new(metric, extent);
             let mut search = Search::new(study.records, usual.error);
             loop {
                 let mut builder =
-                    CacheBuilder::new(&bvh.bounds(), capacity, 0, &mut Arena::over(&mut lines))?;
+                    CacheBuilder::new(&bvh.bounds(), capacity, 0, None, &mut Arena::over(&mut lines))?;
                 for pass in (0..if study.progressive { PASSES } else { 1 }).rev() {
                     // Radii are proportional to the error or to its fourth root.
                     let wider = 2f32.powi(pass);
@@ -136,6 +136,7 @@ impl Study<'_> {
                         least_pixels: wider * LEAST_PIXELS,
                         size,
                         step: &mut *step,
+                        lobes: None,
                     };
                     // This executor never ends early.
                     let _ = placement.fill(&mut builder, &mut executor)?;

@@ -5,6 +5,7 @@ use super::neighbours::Neighbours;
 use super::record::Record;
 use crate::Rgb;
 use crate::cache::octree::Octree;
+use crate::cache::radiance::{PooledRecord, RecordCoefficients};
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use glam::Vec3;
@@ -33,6 +34,8 @@ pub struct IrradianceCache<'m> {
     least_cos: f32,
     /// Number of records rejected for lack of memory.
     refused: u64,
+    /// Coefficients of radiance beside the records of surfaces with served lobes.
+    coefficients: Option<RecordCoefficients<'m>>,
 }
 
 impl<'m> IrradianceCache<'m> {
@@ -58,7 +61,19 @@ impl<'m> IrradianceCache<'m> {
     pub fn new(bounds: &Bounds, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let records = arena.slice(capacity)?;
         let tree = Octree::new(bounds, capacity, arena)?;
-        Ok(Self { records, used: 0, tree, least_cos: libm::cosf(GREATEST_DEVIATION), refused: 0 })
+        let least_cos = libm::cosf(GREATEST_DEVIATION);
+        Ok(Self { records, used: 0, tree, least_cos, refused: 0, coefficients: None })
+    }
+
+    /// This cache, still empty, with coefficients beside its records.
+    pub fn with_coefficients(self, coefficients: Option<RecordCoefficients<'m>>) -> Self {
+        Self { coefficients, ..self }
+    }
+
+    /// Coefficients beside the records, if some surfaces of the scene need them.
+    #[inline]
+    pub fn coefficients(&self) -> Option<&RecordCoefficients<'m>> {
+        self.coefficients.as_ref()
     }
 
     /// Records in order of insertion.
@@ -143,6 +158,22 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
+    /// Calls `visit` with each record that is valid at a point, its number and its weight, while it returns
+    /// true.
+    pub(crate) fn visit_numbered(
+        &self,
+        point: &QueryPoint,
+        mut visit: impl FnMut(u32, &Record, f32) -> bool,
+    ) {
+        self.tree.at(point.position, |index| match self.records.get(index as usize) {
+            Some(record) => match record.at(point, self.least_cos) {
+                Some((_, weight)) => visit(index, record, weight),
+                None => true,
+            },
+            None => true,
+        });
+    }
+
     /// Calls `visit` with the irradiance that each valid record extrapolates to a point, and its weight.
     pub fn visit_values(&self, point: &QueryPoint, mut visit: impl FnMut(Rgb, f32)) {
         self.tree.at(point.position, |index| {
@@ -159,9 +190,22 @@ impl<'m> IrradianceCache<'m> {
     /// infinite), the record must be valid for any height.
     #[inline]
     pub fn covers(&self, point: &QueryPoint) -> bool {
+        self.is_covered(point, |_| true)
+    }
+
+    /// True if a record with coefficients covers the point.
+    pub fn covers_lobe(&self, point: &QueryPoint) -> bool {
+        self.is_covered(point, |index| {
+            self.coefficients.as_ref().is_some_and(|found| found.of(index).is_some())
+        })
+    }
+
+    /// True if a record covers the point for which `is_asked` holds.
+    #[inline]
+    fn is_covered(&self, point: &QueryPoint, is_asked: impl Fn(u32) -> bool) -> bool {
         let mut covered = false;
         self.tree.at(point.position, |index| {
-            let record = self.records.get(index as usize);
+            let record = self.records.get(index as usize).filter(|_| is_asked(index));
             let is_certain = |record: &Record| point.within < f32::INFINITY || record.exposed(point) == 0.0;
             covered = record.is_some_and(|record| record.covers(point, self.least_cos) && is_certain(record));
             !covered
@@ -171,7 +215,16 @@ impl<'m> IrradianceCache<'m> {
 
     /// Inserts a record, after it and its neighbours have been compared and clamped. Returns whether there
     /// was memory.
-    pub fn insert(&mut self, mut record: Record) -> bool {
+    pub fn insert(&mut self, record: Record) -> bool {
+        self.insert_with(record, None)
+    }
+
+    /// [`IrradianceCache::insert`] with coefficients in `registers` of their own.
+    pub fn insert_with(
+        &mut self,
+        mut record: Record,
+        coefficients: Option<(&PooledRecord, &[[u16; 16]])>,
+    ) -> bool {
         if self.is_full() {
             self.refused += 1;
             return false;
@@ -182,6 +235,9 @@ impl<'m> IrradianceCache<'m> {
         neighbours.clamp(&mut record);
         if let Some(slot) = self.records.get_mut(self.used) {
             *slot = record;
+        }
+        if let Some(known) = &mut self.coefficients {
+            known.set(self.used, coefficients);
         }
         if self.used.is_power_of_two() {
             self.link(2 * self.used);
@@ -209,6 +265,9 @@ impl<'m> IrradianceCache<'m> {
 
     /// Keeps the records for which `is_kept` holds, in order.
     pub fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        if let Some(known) = &mut self.coefficients {
+            known.retain(self.used, &is_kept);
+        }
         let mut kept = 0;
         for index in (0..self.used).filter(|&index| is_kept(index)) {
             self.records.copy_within(index..index + 1, kept);
@@ -216,6 +275,20 @@ impl<'m> IrradianceCache<'m> {
         }
         self.used = kept;
         self.rebuild();
+    }
+
+    /// Scales the gradients of coefficients by 1/`factor`, as [`Record::widened`] does.
+    pub fn widen_coefficients(&mut self, factor: f32) {
+        if let Some(known) = &mut self.coefficients {
+            known.widen(factor);
+        }
+    }
+
+    /// Restores the coefficients of the records of [`IrradianceCache::restore`].
+    pub fn restore_coefficients(&mut self, records: &[PooledRecord], registers: &[[u16; 16]]) {
+        if let Some(known) = &mut self.coefficients {
+            known.restore(records, registers);
+        }
     }
 
     /// Scales all radii by `share`, as for an allowed error scaled by its fourth power. Uncovered areas have

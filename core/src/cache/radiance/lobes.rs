@@ -4,7 +4,8 @@
 //! the reflectance f0 at normal incidence: f = f0 W + (1 - f0) E, W with F = 1 and E with F = (1 - c)⁵. One
 //! table of both serves every metal and every coat with Schlick's reflectance, whatever its colour and
 //! texture. With the viewer in the plane of x and z a lobe is even in y, so that functions with a sine have
-//! no coefficient; a viewer at azimuth φ multiplies c_{d,m} by (cos mφ, sin mφ).
+//! no coefficient; a viewer at azimuth φ multiplies c_{d,m} by (cos mφ, sin mφ). Another table has the
+//! reflectance of a dielectric in place of F = 1; its lobes have the reflectance 1 at normal incidence.
 //!
 //! The radiance that leaves is Lo = Σ c_k λ_k. By Cauchy and Schwarz its error is at most the norm of the
 //! rest f - P_d f times the norm of the light beyond degree d. τ_d = √π ‖f - P_d f‖/∫ f cos dω is thus the
@@ -13,7 +14,7 @@
 //! (Křivánek et al. 2005, with a maximum of the error in its place).
 
 use super::zernike::{COUNT_MAX, DEGREE_MAX, index, values};
-use crate::bsdf::fresnel::schlick_weight;
+use crate::bsdf::fresnel::{dielectric, schlick_weight};
 use crate::bsdf::ggx::Ggx;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
@@ -115,6 +116,7 @@ impl Lobe {
     fn integrate(
         angle: f32,
         alpha: f32,
+        reflectance: impl Fn(f32) -> f32,
         radial: &[[f32; ROWS]; POINTS],
         around: &[[f32; DEGREE_MAX + 1]; POINTS],
     ) -> Self {
@@ -132,8 +134,9 @@ impl Lobe {
                 let azimuth = Vec2::new(around[1], libm::sqrtf((1.0 - around[1] * around[1]).max(0.0)));
                 let wi = (sin * azimuth).extend(cos);
                 let h = wo + wi;
-                let white = ggx.density(h) * ggx.visibility(wo, wi);
-                let edge = white * schlick_weight(wo.dot(h) / h.length());
+                let lobe = ggx.density(h) * ggx.visibility(wo, wi);
+                let cos = wo.dot(h) / h.length();
+                let (white, edge) = (lobe * reflectance(cos), lobe * schlick_weight(cos));
                 for (sum, product) in squares.iter_mut().zip([white * white, white * edge, edge * edge]) {
                     *sum += weight * product;
                 }
@@ -204,6 +207,18 @@ impl<'m> LobeTable<'m> {
     /// # Errors
     /// [`OutOfMemory`] if the arena has less than the footprint.
     pub fn build(arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        Self::build_with(|_| 1.0, arena)
+    }
+
+    /// Table for coats of a dielectric with the index of refraction `eta` in place of F = 1.
+    ///
+    /// # Errors
+    /// Those of [`LobeTable::build`].
+    pub fn build_dielectric(eta: f32, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        Self::build_with(|cos| dielectric(cos, eta), arena)
+    }
+
+    fn build_with(reflectance: impl Fn(f32) -> f32, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let nodes: &mut [Lobe] = arena.slice(ANGLES * ROUGHNESSES)?;
         let mut radial = [[0.0; ROWS]; POINTS];
         let mut around = [[0.0; DEGREE_MAX + 1]; POINTS];
@@ -220,7 +235,7 @@ impl<'m> LobeTable<'m> {
             let angle = (at % ANGLES) as f32 * ANGLE_MAX / (ANGLES - 1) as f32;
             let alpha =
                 ALPHA_MIN * libm::powf(1.0 / ALPHA_MIN, (at / ANGLES) as f32 / (ROUGHNESSES - 1) as f32);
-            *node = Lobe::integrate(angle, alpha, &radial, &around);
+            *node = Lobe::integrate(angle, alpha, &reflectance, &radial, &around);
         }
         Ok(Self { nodes })
     }

@@ -1,8 +1,8 @@
 //! Coefficients of many records as half floats in the caller's memory, and the light that a lobe reflects
 //! from them.
 //!
-//! A record has coefficients over its irradiance, and their gradients over the irradiance times a unit of
-//! length, both of which are of the order of 1 in every scene. Gradients stop two degrees below the values:
+//! A record has coefficients over E/√π, which is the coefficient of degree 0, and their gradients over E/√π
+//! times a unit of length, both of which are of the order of 1 in every scene. Gradients stop two degrees below the values:
 //! higher ones add noise and no precision. Degree 6 takes 384 bytes, degree 8 takes 672.
 
 use super::coefficients::{Coefficients, GROUPS_MAX};
@@ -13,6 +13,7 @@ use crate::Level;
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
+use core::f32::consts::PI;
 use glam::Vec2;
 use halflight_simd::half::from_f32;
 use halflight_simd::kernels::dots::Dots;
@@ -91,6 +92,58 @@ pub struct CoefficientPool<'m> {
     used: usize,
 }
 
+impl PooledRecord {
+    /// True if this is a record with coefficients, of a pool or of registers of its own.
+    pub fn is_some(&self) -> bool {
+        self.unit > 0.0
+    }
+
+    /// True if it is none, or a record whose coefficients are among `registers`.
+    pub fn is_sound(&self, registers: usize) -> bool {
+        let finite = self.irradiance.iter().all(|value| value.is_finite() && *value >= 0.0);
+        let is_inside = self.degree as usize <= DEGREE_MAX && self.range().end <= registers;
+        *self == Self::default() || finite && self.unit.is_finite() && self.unit > 0.0 && is_inside
+    }
+
+    /// Range of its registers.
+    fn range(&self) -> core::ops::Range<usize> {
+        let first = self.offset as usize;
+        first..first.saturating_add(registers((self.degree as usize).min(DEGREE_MAX)))
+    }
+}
+
+/// Number of registers of a record of `degree`.
+pub(crate) const fn registers_of(degree: usize) -> usize {
+    registers(if degree > DEGREE_MAX { DEGREE_MAX } else { degree })
+}
+
+/// Writes coefficients and gradients, the latter in the unit of length `unit`, above 0, to the registers of
+/// one record. `None` if there are fewer than [`registers_of`].
+pub(crate) fn write(
+    out: &mut [[u16; 16]],
+    coefficients: &Coefficients,
+    gradients: &Gradients,
+    unit: f32,
+) -> Option<PooledRecord> {
+    let degree = coefficients.degree.min(DEGREE_MAX);
+    let (values, slopes) = (groups(degree), groups(gradient_degree(degree)));
+    let free = out.get_mut(..registers(degree))?;
+    let irradiance = coefficients.irradiance().to_array();
+    let irradiance = irradiance.map(|value| if value > 0.0 && value.is_finite() { value } else { 0.0 });
+    let (free_values, free_slopes) = free.split_at_mut(3 * values);
+    let rows = free_values.chunks_exact_mut(values).zip(free_slopes.chunks_exact_mut(2 * slopes));
+    for (channel, (row, pair)) in rows.enumerate() {
+        // A black or invalid channel stores zeros.
+        let scale = libm::sqrtf(PI) / irradiance[channel];
+        let scale = if scale > 0.0 && scale.is_finite() { scale } else { 0.0 };
+        store(row, degree, |k| scale * coefficients.values[channel][k]);
+        for (axis, row) in pair.chunks_exact_mut(slopes).enumerate() {
+            store(row, gradient_degree(degree), |k| scale * unit * gradients[channel][k][axis]);
+        }
+    }
+    Some(PooledRecord { irradiance, unit, offset: 0, degree: degree as u32 })
+}
+
 impl<'m> CoefficientPool<'m> {
     /// Footprint of `records` records of `degree`.
     pub fn footprint(records: usize, degree: usize) -> Footprint {
@@ -114,50 +167,81 @@ impl<'m> CoefficientPool<'m> {
         gradients: &Gradients,
         unit: f32,
     ) -> Option<PooledRecord> {
-        let degree = coefficients.degree.min(DEGREE_MAX);
-        let (values, slopes) = (groups(degree), groups(gradient_degree(degree)));
         let offset = u32::try_from(self.used).ok()?;
-        let free = self.registers.get_mut(self.used..self.used + registers(degree))?;
-        let irradiance = coefficients.irradiance().to_array();
-        let irradiance = irradiance.map(|value| if value > 0.0 && value.is_finite() { value } else { 0.0 });
-        let (free_values, free_slopes) = free.split_at_mut(3 * values);
-        let rows = free_values.chunks_exact_mut(values).zip(free_slopes.chunks_exact_mut(2 * slopes));
-        for (channel, (row, pair)) in rows.enumerate() {
-            // A black or invalid channel stores zeros.
-            let scale = 1.0 / irradiance[channel];
-            let scale = if scale > 0.0 && scale.is_finite() { scale } else { 0.0 };
-            store(row, degree, |k| scale * coefficients.values[channel][k]);
-            for (axis, row) in pair.chunks_exact_mut(slopes).enumerate() {
-                store(row, gradient_degree(degree), |k| scale * unit * gradients[channel][k][axis]);
-            }
+        let record = write(self.registers.get_mut(self.used..)?, coefficients, gradients, unit)?;
+        self.used += record.range().len();
+        Some(PooledRecord { offset, ..record })
+    }
+
+    /// Copies `record` from its `registers`. `None` without memory.
+    pub fn append(&mut self, record: &PooledRecord, registers: &[[u16; 16]]) -> Option<PooledRecord> {
+        let offset = u32::try_from(self.used).ok()?;
+        let from = registers.get(record.range())?;
+        let free = self.registers.get_mut(self.used..self.used + from.len())?;
+        free.copy_from_slice(from);
+        self.used += from.len();
+        Some(PooledRecord { offset, ..*record })
+    }
+
+    /// Empties the pool, so that records can be kept in it with [`CoefficientPool::keep`].
+    pub fn clear(&mut self) {
+        self.used = 0;
+    }
+
+    /// Keeps `record` of the pool before [`CoefficientPool::clear`]; records come in the order of their
+    /// insertion. `None` for a record of another pool.
+    pub fn keep(&mut self, record: &PooledRecord) -> Option<PooledRecord> {
+        let range = record.range();
+        if range.start < self.used || range.end > self.registers.len() {
+            return None;
         }
-        self.used += registers(degree);
-        Some(PooledRecord { irradiance, unit, offset, degree: degree as u32 })
+        let (offset, count) = (self.used, range.len());
+        self.registers.copy_within(range, offset);
+        self.used += count;
+        Some(PooledRecord { offset: offset as u32, ..*record })
+    }
+
+    /// Registers in use, in the order of insertion.
+    pub fn registers(&self) -> &[[u16; 16]] {
+        self.registers.get(..self.used).unwrap_or_default()
     }
 
     /// Σ w_k (λ_k + ∇λ_k · Δ) of each channel for a lobe, at the distance `delta` in m along the tangent axes
     /// of the record: at least 0.05 and at most 20 times the light at the record, and not negative. Zero for
     /// a record of another pool.
     pub fn reflected(&self, level: Level, record: &PooledRecord, weights: &Weights, delta: Vec2) -> Rgb {
+        self.reflected_by(level, record, [weights; 3], delta)
+    }
+
+    /// [`CoefficientPool::reflected`] with other weights for each channel: the lobe of a coloured surface.
+    pub fn reflected_by(
+        &self,
+        level: Level,
+        record: &PooledRecord,
+        weights: [&Weights; 3],
+        delta: Vec2,
+    ) -> Rgb {
         let degree = (record.degree as usize).min(DEGREE_MAX);
         let (values, slopes) = (groups(degree), groups(gradient_degree(degree)));
-        let first = record.offset as usize;
-        let Some(rows) = self.registers.get(first..first.saturating_add(registers(degree))) else {
-            return Rgb::ZERO;
-        };
-        let (mut own, mut slope) = ([0.0; 3], [0.0; 6]);
+        let Some(rows) = self.registers.get(record.range()) else { return Rgb::ZERO };
         let (of_values, of_slopes) = rows.split_at(3 * values);
-        Dots { rows: of_values, weights: weights.0.get(..values).unwrap_or_default(), out: &mut own }
-            .compute(level);
-        Dots { rows: of_slopes, weights: weights.0.get(..slopes).unwrap_or_default(), out: &mut slope }
-            .compute(level);
         let step = if record.unit > 0.0 { delta / record.unit } else { Vec2::ZERO };
-        Rgb::from_array(core::array::from_fn(|channel| {
-            let here = own[channel].max(0.0);
-            let there = own[channel] + step.dot(Vec2::new(slope[2 * channel], slope[2 * channel + 1]));
+        let mut reflected = [0.0; 3];
+        let rows = of_values.chunks_exact(values).zip(of_slopes.chunks_exact(2 * slopes));
+        for (channel, ((reflected, weights), (of_values, of_slopes))) in
+            reflected.iter_mut().zip(weights).zip(rows).enumerate()
+        {
+            let (mut own, mut slope) = ([0.0], [0.0; 2]);
+            Dots { rows: of_values, weights: weights.0.get(..values).unwrap_or_default(), out: &mut own }
+                .compute(level);
+            Dots { rows: of_slopes, weights: weights.0.get(..slopes).unwrap_or_default(), out: &mut slope }
+                .compute(level);
+            let here = own[0].max(0.0);
+            let there = own[0] + step.dot(Vec2::from(slope));
             let within = there.max(EXTRAPOLATION[0] * here).min(EXTRAPOLATION[1] * here);
-            record.irradiance[channel] * within
-        }))
+            *reflected = record.irradiance[channel] * (1.0 / libm::sqrtf(PI)) * within;
+        }
+        Rgb::from_array(reflected)
     }
 
     /// Weighted mean of the light that a lobe reflects at a point, from records with their weights and

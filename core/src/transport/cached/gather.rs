@@ -11,6 +11,8 @@ use crate::bvh::Coherence;
 use crate::cache::irradiance::{
     CellFlux, Hemisphere, OVERHANG_RADIUS_FACTOR, QueryPoint, Record, metric, validity,
 };
+use crate::cache::radiance::derivatives::border_flux;
+use crate::cache::radiance::{Coefficients, PooledRecord, StrataTables, write};
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
@@ -48,6 +50,8 @@ pub struct GatherPoint {
     /// Maximum distance of records that are valid here, and of points at which the record of this point is
     /// valid: [`QueryPoint::within`].
     pub(in crate::transport) within: f32,
+    /// 1 if the viewer sees a lobe that records serve, otherwise 0.
+    pub(in crate::transport) has_lobe: u32,
 }
 
 impl GatherPoint {
@@ -60,6 +64,7 @@ impl GatherPoint {
         triangle: MISS,
         pixel: 0.0,
         within: f32::INFINITY,
+        has_lobe: 0,
     };
 
     /// True if this is a point.
@@ -77,7 +82,18 @@ impl GatherPoint {
             triangle: point.triangle,
             pixel,
             within: f32::INFINITY,
+            has_lobe: 0,
         }
+    }
+
+    /// This point, with a lobe that records serve.
+    pub(in crate::transport) fn with_lobe(self, has_lobe: bool) -> Self {
+        Self { has_lobe: u32::from(has_lobe), ..self }
+    }
+
+    /// True if the record of this point is to have coefficients.
+    pub fn has_lobe(&self) -> bool {
+        self.has_lobe != 0
     }
 
     /// Position of the point.
@@ -199,6 +215,24 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         scratch: &mut Arena,
         counters: &mut Counters,
     ) -> Result<Option<Record>, OutOfMemory> {
+        let found = self.gather_with(place, number, gathering, None, scratch, counters)?;
+        Ok(found.map(|(record, _)| record))
+    }
+
+    /// [`PathIntegrator::gather`] with coefficients of the incident radiance, written to the registers beside
+    /// their tables. The number of strata is that of the tables of `gathering`, and these have to agree.
+    ///
+    /// # Errors
+    /// Those of [`PathIntegrator::gather`].
+    pub fn gather_with(
+        &self,
+        place: &GatherPoint,
+        number: u32,
+        gathering: &Gathering,
+        coefficients: Option<(&StrataTables, &mut [[u16; 16]])>,
+        scratch: &mut Arena,
+        counters: &mut Counters,
+    ) -> Result<Option<(Record, PooledRecord)>, OutOfMemory> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
         let mut arena = scratch.scratch();
@@ -245,7 +279,28 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         record.set_edge_moment(strata.hemisphere().map_or(Rgb::ZERO, |hemisphere| hemisphere.edge_moment()));
         self.find_boundary(&mut record, place, &frame, &strata, counters);
         self.add_overhangs(&mut record, place);
-        Ok(Some(record))
+        let pooled = coefficients.and_then(|(tables, out)| {
+            self.write_coefficients(tables, &strata.hemisphere()?, reach.gradient_scale, &record, out)
+        });
+        Ok(Some((record, pooled.unwrap_or_default())))
+    }
+
+    /// Projects the light of `hemisphere` and writes its coefficients and their gradients, times
+    /// `gradient_scale`, to `out`.
+    fn write_coefficients(
+        &self,
+        tables: &StrataTables,
+        hemisphere: &Hemisphere,
+        gradient_scale: f32,
+        record: &Record,
+        out: &mut [[u16; 16]],
+    ) -> Option<PooledRecord> {
+        let level = self.context.level;
+        let coefficients = Coefficients::project(level, tables, hemisphere)?;
+        let mut gradients = border_flux(level, tables, hemisphere)?.gradients;
+        let scaled = gradients.as_flattened_mut().as_flattened_mut();
+        scaled.iter_mut().for_each(|value| *value *= gradient_scale);
+        write(out, &coefficients, &gradients, record.radii[0])
     }
 
     /// Ray `i` of a gather, and its path.

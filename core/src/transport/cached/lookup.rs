@@ -1,8 +1,9 @@
-//! Irradiance cache as an estimator of the path tracer: reflected light at diffuse vertices and at the bases
-//! of coats, looked up for a block of vertices at once.
+//! Irradiance cache as an estimator of the path tracer: reflected light at diffuse vertices, at the bases of
+//! coats and of served lobes, looked up for a block of vertices at once.
 
 use crate::bsdf::{Bsdf, Features};
 use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS, Points, QueryPoint};
+use crate::cache::radiance::{RecordCoefficients, ServedLobes, Viewer};
 use crate::scene::SurfacePoint;
 use crate::transport::cached::overhang;
 use crate::transport::path::PathIntegrator;
@@ -14,6 +15,7 @@ use crate::transport::wavefront::{BLOCK, Wavefront};
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use core::ops::Range;
+use glam::Vec3;
 
 const _: () = assert!(BLOCK == POINTS, "a block of vertices is looked up at once");
 
@@ -27,6 +29,15 @@ const SMALL: f32 = 0.1;
 /// Weight of a base with a record beside its coat: the record has the base's indirect light, and light
 /// samples find most of the rest.
 const BASE_WEIGHT: f32 = 0.6;
+
+/// Light that records supply at a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CachedLight {
+    /// Irradiance and moments, with a valid record.
+    irradiance: Option<CachedIrradiance>,
+    /// Radiance that the lobe of the surface reflects, if a valid record serves it.
+    lobe: Option<Rgb>,
+}
 
 /// Irradiance caches that paths look up.
 #[derive(Clone, Copy)]
@@ -42,6 +53,38 @@ pub enum CacheView<'a> {
 }
 
 impl CacheView<'_> {
+    /// Lobes that the records serve.
+    fn lobes(&self) -> Option<&ServedLobes<'_>> {
+        match self {
+            CacheView::Pair([cache, _]) | CacheView::UnderConstruction(cache) => {
+                cache.coefficients().map(RecordCoefficients::lobes)
+            }
+            CacheView::Everywhere => None,
+        }
+    }
+
+    /// Radiance that the lobe at `point` reflects in the direction `viewer`, if it is served and a valid
+    /// record has coefficients.
+    fn reflected<F: Features>(
+        &self,
+        context: &SceneContext<F>,
+        point: &SurfacePoint,
+        (query, sample): (&QueryPoint, u32),
+        viewer: Vec3,
+    ) -> Option<Rgb> {
+        let lobes = self.lobes()?;
+        let cos = viewer.dot(query.normal);
+        let lobe = &lobes.find(&context.bsdf_at(point), cos)?;
+        let viewer = Viewer { lobe, direction: viewer };
+        match self {
+            CacheView::Pair(caches) => {
+                caches[sample as usize & 1].reflected(context.level, query, &viewer, false)
+            }
+            CacheView::UnderConstruction(cache) => cache.reflected(context.level, query, &viewer, true),
+            CacheView::Everywhere => None,
+        }
+    }
+
     /// Looks up all `queries`, each with its sample number. Writes the distance up to which each is `exposed`
     /// ([`IrradianceCache::at_all`]).
     fn find<F: Features>(
@@ -80,9 +123,16 @@ impl CacheView<'_> {
 }
 
 /// Sample number of a path, if the path looks up the cache at `point`, the hit of its ray.
-fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &PathSettings) -> Option<u32> {
+fn sample_of(
+    wave: &Wavefront,
+    ray: usize,
+    point: &SurfacePoint,
+    lobes: Option<&ServedLobes>,
+    settings: &PathSettings,
+) -> Option<u32> {
     let path = wave.paths.get(wave.rays.get(ray)?.tag as usize)?;
-    let asks = point.material.surface.may_have_base()
+    let surface = &point.material.surface;
+    let asks = (surface.may_have_base() || lobes.is_some_and(|lobes| lobes.may_serve(surface)))
         && path.classes.has_rough()
         && u32::from(path.segments) < settings.max_depth
         // Records do not store their distance from the camera.
@@ -92,7 +142,7 @@ fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &Path
 
 impl<F: Features> LightEstimator<F> for CacheView<'_> {
     type State = ();
-    type Found = Option<CachedIrradiance>;
+    type Found = CachedLight;
 
     #[inline]
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {
@@ -105,7 +155,7 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
 
     #[inline]
     fn separates_coat(&self, _: &SceneContext<F>, bsdf: &Bsdf, found: &Self::Found) -> bool {
-        found.is_some() && bsdf.has_coated_base()
+        found.irradiance.is_some() && found.lobe.is_none() && bsdf.has_coated_base()
     }
 
     fn look_up(
@@ -113,29 +163,43 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         (context, settings): (&SceneContext<F>, &PathSettings),
         (wave, range): (&Wavefront, Range<usize>),
         points: &[Option<SurfacePoint>; BLOCK],
-        found: &mut [Option<CachedIrradiance>; BLOCK],
+        found: &mut [CachedLight; BLOCK],
         counters: &mut Counters,
     ) {
-        let mut exposed = [0.0; BLOCK];
+        let lobes = if F::GLOSSY { self.lobes() } else { None };
+        let (mut exposed, mut irradiance) = ([0.0; BLOCK], [None; BLOCK]);
         let asking: [Option<(&SurfacePoint, u32)>; BLOCK] = core::array::from_fn(|i| {
             let point = points[i].as_ref()?;
-            Some((point, sample_of(wave, range.start + i, point, settings)?))
+            Some((point, sample_of(wave, range.start + i, point, lobes, settings)?))
         });
         let open = |(point, sample): (&SurfacePoint, u32)| {
             (QueryPoint::open(point.position, point.frame.normal), sample)
         };
-        self.find::<F>(context.level, &asking.map(|asking| asking.map(open)), found, &mut exposed);
-        if exposed == [0.0; BLOCK] {
-            return;
+        let mut queries = asking.map(|asking| asking.map(open));
+        self.find::<F>(context.level, &queries, &mut irradiance, &mut exposed);
+        if exposed != [0.0; BLOCK] {
+            // Points below a close overhang are looked up again.
+            let points = asking.map(|asking| asking.map(|(point, _)| point));
+            let within = overhang::within(context, &points, &exposed, counters);
+            let again = core::array::from_fn(|i| {
+                let (query, sample) = queries[i].filter(|_| within[i] < exposed[i])?;
+                Some((QueryPoint { within: within[i], ..query }, sample))
+            });
+            self.find::<F>(context.level, &again, &mut irradiance, &mut exposed);
+            queries = core::array::from_fn(|i| again[i].or(queries[i]));
         }
-        // Points below a close overhang are looked up again.
-        let points = asking.map(|asking| asking.map(|(point, _)| point));
-        let within = overhang::within(context, &points, &exposed, counters);
-        let again = core::array::from_fn(|i| {
-            let (query, sample) = asking[i].map(open).filter(|_| within[i] < exposed[i])?;
-            Some((QueryPoint { within: within[i], ..query }, sample))
-        });
-        self.find::<F>(context.level, &again, found, &mut exposed);
+        found.iter_mut().zip(irradiance).for_each(|(found, known)| found.irradiance = known);
+        if lobes.is_some() {
+            for (i, query) in queries.iter().enumerate() {
+                if let Some((query, sample)) = query
+                    && let Some(point) = points[i].as_ref().filter(|_| irradiance[i].is_some())
+                    && let Some(ray) = wave.rays.get(range.start + i)
+                {
+                    let viewer = -Vec3::from(ray.direction);
+                    found[i].lobe = self.reflected(context, point, (query, *sample), viewer);
+                }
+            }
+        }
     }
 
     #[inline]
@@ -144,11 +208,22 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         (context, _): (&SceneContext<F>, &PathSettings),
         vertex: &PathVertex,
         _: &mut (),
-        found: Option<CachedIrradiance>,
+        found: CachedLight,
         add: &mut impl FnMut(KnownLight),
     ) -> RemainingLight {
         let PathVertex { throughput, ref bsdf, wo, apart, .. } = *vertex;
-        let Some(indirect) = found else { return RemainingLight::all(vertex) };
+        let Some(indirect) = found.irradiance else { return RemainingLight::all(vertex) };
+        if F::GLOSSY
+            && let Some(lobe) = found.lobe
+        {
+            let base = match bsdf.has_coated_base() {
+                true => bsdf.base_radiance::<F>(wo, indirect.irradiance, indirect.edge_moment),
+                false => Rgb::ZERO,
+            };
+            add(KnownLight { contribution: throughput * (lobe + base), blur: Rgb::ZERO });
+            let light_samples = self.light_samples(context);
+            return RemainingLight { light_samples, ..RemainingLight::of(PathClasses::DIRECT) };
+        }
         let contribution = match bsdf {
             Bsdf::Diffuse(diffuse) => throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI,
             _ if F::GLOSSY && bsdf.has_coated_base() => {

@@ -4,9 +4,9 @@
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
+use crate::cache::radiance::ServedLobes;
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
-use crate::scene::SurfacePoint;
 use crate::transport::cached::gather::GatherPoint;
 use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
@@ -92,6 +92,19 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         out: &mut [GatherPoint],
         counters: &mut Counters,
     ) {
+        self.places_with(order, first, (sample, sight), None, out, counters);
+    }
+
+    /// [`PathIntegrator::places`], and points with one of the `lobes` that records serve.
+    pub fn places_with(
+        &self,
+        order: &ProgressiveOrder,
+        first: u64,
+        (sample, sight): (u32, Via),
+        lobes: Option<&ServedLobes>,
+        out: &mut [GatherPoint],
+        counters: &mut Counters,
+    ) {
         let mut rays = [Ray::segment(Vec3::ZERO, Vec3::Z, -1.0); PIXELS];
         let mut hits = [Hit::NONE; PIXELS];
         let (width, height) = (self.settings.width, self.settings.height);
@@ -107,8 +120,8 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             *place = GatherPoint::NONE;
             if let Some((x, y)) = order.pixel(first + i as u64) {
                 let sampler = Sampler::new(self.settings.seed, y * width + x, sample);
-                let found = self.first_diffuse((rays[i], hits[i]), pixel, sight, &sampler, counters);
-                *place = found.map_or(GatherPoint::NONE, |(point, width)| GatherPoint::of(&point, width));
+                let found = self.first_diffuse((rays[i], hits[i]), pixel, (sight, lobes), &sampler, counters);
+                *place = found.unwrap_or(GatherPoint::NONE);
             }
         }
     }
@@ -118,16 +131,16 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         self.context.scene.materials.iter().any(|material| material.surface.may_be_rough())
     }
 
-    /// First diffuse point of a camera ray with first hit `hit`, and the width of a pixel there; `spread` is
-    /// the width at distance 1.
+    /// First diffuse point, or point with a served lobe, of a camera ray with first hit `hit`. `spread` is
+    /// the width of a pixel at distance 1.
     fn first_diffuse(
         &self,
         (ray, mut hit): (Ray, Hit),
         mut spread: f32,
-        sight: Via,
+        (sight, lobes): (Via, Option<&ServedLobes>),
         sampler: &Sampler,
         counters: &mut Counters,
-    ) -> Option<(SurfacePoint<'_>, f32)> {
+    ) -> Option<GatherPoint> {
         let context = &self.context;
         let mut segment = Segment::first(ray);
         let (mut width, mut seen) = (0.0, Via::Specular);
@@ -137,10 +150,15 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             width += spread * segment.length;
             let bsdf = self.context.bsdf_at(&point);
             let is_wanted = seen == sight && point.frame.normal.dot(point.geometric_normal) > SMOOTH;
+            let place = |has_lobe| is_wanted.then(|| GatherPoint::of(&point, width).with_lobe(has_lobe));
             if let Bsdf::Diffuse(_) = bsdf {
-                return is_wanted.then_some((point, width));
+                return place(false);
             }
             let wo = point.frame.to_local(-Vec3::from(segment.ray.direction));
+            // Paths end at a served lobe, and records behind rough surfaces have no coefficients.
+            if F::GLOSSY && seen == Via::Specular && lobes.is_some_and(|lobes| lobes.serves(&bsdf, wo.z)) {
+                return place(true);
+            }
             let [u, v] = dimension::scattering(sampler, segments);
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
             let sample = if F::GLOSSY && bsdf.has_coated_base() {
@@ -149,7 +167,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
                 let sample = bsdf.sample_apart::<F>(wo, [u, v, lobe], base_weight);
                 match sample.filter(|(_, is_coat)| *is_coat) {
                     Some((sample, _)) if seen != sight || sample.delta => sample,
-                    _ => return is_wanted.then_some((point, width)),
+                    _ => return place(false),
                 }
             } else {
                 bsdf.sample::<F>(wo, [u, v, lobe])?

@@ -1,4 +1,4 @@
-//! Irradiance caching in the program: caustic photons if a prepass finds that they pay, cache files, and
+//! Irradiance and radiance caching in the program: caustic photons if a prepass finds that they pay, cache files, and
 //! surveys.
 
 use super::path;
@@ -15,8 +15,8 @@ use crate::render::survey::{self, Survey};
 use crate::render::threads::{ThreadedRound, Threads, Workers};
 use crate::save::Patience;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{IrradianceCache, Record};
-use halflight_core::findings::Decision::{Limited, Used};
+use halflight_core::cache::irradiance::IrradianceCache;
+use halflight_core::findings::Decision::{LeftOut, Limited, Used};
 use halflight_core::findings::{Finding, Findings, Value};
 use halflight_core::memory::{Footprint, Line};
 use halflight_core::method::caustics::{
@@ -27,7 +27,7 @@ use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching}
 use halflight_core::method::path::PathTracing;
 use halflight_core::method::record_placement::CacheBuilder;
 use halflight_core::method::{LastMaps, Method as _};
-use halflight_core::scene::{Material, Surface};
+use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::PathIntegrator;
 
 /// Emission of caustic photons, if they pay and fit into memory besides the needs of `cache`.
@@ -42,7 +42,7 @@ fn find_caustics<'m, F: Features>(
     }
     let needed = scratch::<F>(cache, true).bytes().saturating_mul(workers.count());
     // Memory is shared equally between records and photons.
-    let reserved = needed.saturating_add(later(cache));
+    let reserved = needed.saturating_add(later(cache, setup.scene));
     let reserved = reserved.saturating_add(least_footprint().bytes());
     let scratch = caustics::scratch::<F>();
     if scratch.bytes().saturating_mul(workers.count()) > memory.available() {
@@ -70,6 +70,7 @@ const LOADED: &str = "loaded records";
 
 /// Irradiance caching at work.
 pub(super) struct Cached<'m, F> {
+    chosen: Method,
     method: IrradianceCaching<'m, F>,
     setup: RenderSetup<'m>,
     /// Caustic photons, if they pay.
@@ -91,21 +92,24 @@ pub(super) struct Cached<'m, F> {
 
 impl<'m, F: Features> Cached<'m, F> {
     /// Runs the prepass for caustics, allocates memory and sets up the method.
-    pub(super) fn new(setup: &RenderSetup<'m>, memory: &mut Memory<'m>) -> Result<Self, RenderError> {
+    pub(super) fn new(
+        chosen: Method,
+        setup: &RenderSetup<'m>,
+        memory: &mut Memory<'m>,
+    ) -> Result<Self, RenderError> {
         let RenderSetup { scene, settings, workers, .. } = *setup;
         let file = cache_file::open(scene, settings, memory.for_file())?;
         let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
-        let bytes = Footprint::default().slice::<Record>(header.records());
-        memory.set_aside(LOADED, bytes)?;
-        let loaded = file.map(Reader::records).transpose()?.unwrap_or_default();
-        let fewest = loaded.iter().map(Vec::len).max().unwrap_or(0);
-        let cache = core_settings::<F>(setup, fewest);
+        memory.set_aside(LOADED, Footprint::default().slice::<u8>(header.bytes() as usize))?;
+        let loaded = file.map(Reader::load).transpose()?.unwrap_or_default();
+        let fewest = loaded.iter().map(|half| half.records.len()).max().unwrap_or(0);
+        let cache = core_settings::<F>(chosen, setup, fewest);
         let (emission, caustics) = find_caustics::<F>(setup, memory, &cache)?;
         let scratch = scratch::<F>(&cache, emission.is_some());
         let scratch = memory.take_each("paths", scratch, workers.count())?;
         let photons = match emission {
             Some(emission) => {
-                let reserved = later(&cache);
+                let reserved = later(&cache, scene);
                 let settings =
                     CausticSettings { beside_records: true, reserved, most_rays: setup.most_rays() };
                 CausticPhotons::new(&setup.context(), emission, settings, memory)?
@@ -121,13 +125,17 @@ impl<'m, F: Features> Cached<'m, F> {
         };
         let view = View::of(scene, settings);
         let gathered = header.halves.map(|half| half.gathered);
-        method.restore(loaded.each_ref().map(|records| &records[..]), gathered);
+        method.restore(loaded.each_ref().map(|half| &half.records[..]), gathered);
+        method.restore_coefficients(
+            loaded.each_ref().map(|half| (&half.coefficients[..], &half.registers[..])),
+        );
         if header.serves(&view) {
             method.finish();
         }
         drop(loaded);
         memory.give_back(LOADED);
         Ok(Self {
+            chosen,
             method,
             setup: *setup,
             photons,
@@ -208,12 +216,45 @@ impl<'m, F: Features> Cached<'m, F> {
             .with_count("refused", refused)
     }
 
+    /// Finding on the lobes that records serve.
+    fn lobe_finding(&self) -> Finding {
+        let may_be_rough = |material: &&Material| material.surface.may_be_rough();
+        let Some(gathering) = self.method.lobes() else {
+            let rough = self.setup.scene.materials.iter().filter(may_be_rough).count() as u64;
+            let reason = match rough {
+                0 => "no surface has a rough reflection",
+                _ => "the lobes are too narrow for records: they are path traced",
+            };
+            return Finding::new("radiance_records", LeftOut, reason)
+                .with_count("path_traced_materials", rough);
+        };
+        let (lobes, caches) = (gathering.lobes(), self.method.caches());
+        let with_lobes = |cache: &IrradianceCache| {
+            let records = cache.records().len();
+            let found = cache.coefficients().map(|known| known.records(records));
+            found.into_iter().flatten().filter(|record| record.is_some()).count() as u64
+        };
+        let census = lobes.census();
+        let reason = match census.left {
+            0 => "the light of rough reflections is interpolated",
+            _ => "the light of wide lobes is interpolated: narrow ones are path traced",
+        };
+        Finding::new("radiance_records", Used, reason)
+            .with("basis", Value::Name("zernike"))
+            .with("degree", Value::Count(lobes.degree() as u64))
+            .with("tolerance", Value::Number(self.setup.settings.lobes.tolerance.into()))
+            .with("rays_per_record", Value::Count(gathering.rays() as u64))
+            .with("records", Value::Count(caches.iter().map(|cache| with_lobes(cache)).sum()))
+            .with_count("served_materials", census.served)
+            .with_count("path_traced_materials", census.left)
+    }
+
     /// Writes the file during the render, or at the end if a write is outstanding.
     fn keep(&mut self, last: Option<Patience>) {
         let caches = self.method.caches();
         for ((half, cache), gathered) in self.header.halves.iter_mut().zip(caches).zip(self.method.gathered())
         {
-            *half = Half { records: cache.records().len() as u32, gathered };
+            *half = Half::of(cache, gathered);
         }
         let header = &self.header;
         self.kept.keep(last, |path, patience| cache_file::write(path, header, caches, patience));
@@ -222,7 +263,7 @@ impl<'m, F: Features> Cached<'m, F> {
 
 impl<F: Features> Renderer for Cached<'_, F> {
     fn chosen(&self) -> Method {
-        Method::IrradianceCache
+        self.chosen
     }
 
     fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
@@ -284,21 +325,23 @@ impl<F: Features> Renderer for Cached<'_, F> {
 
     fn findings(&self) -> Findings {
         let photons = self.photons.as_ref().map(|photons| photons.statistics());
-        Findings::from(self.finding()).and(self.caustics.findings(photons))
+        let lobes = (self.chosen == Method::RadianceCache).then(|| self.lobe_finding());
+        Findings::from(self.finding()).and(lobes).and(self.caustics.findings(photons))
     }
 }
 
 /// Settings of a picture's caches with room for at least `fewest` records each.
-fn core_settings<F: Features>(setup: &RenderSetup, fewest: usize) -> CacheSettings {
+fn core_settings<F: Features>(chosen: Method, setup: &RenderSetup, fewest: usize) -> CacheSettings {
     let RenderSetup { settings, .. } = *setup;
     CacheSettings {
         metric: settings.cache.metric,
         error: settings.cache.allowed(),
         strata: settings.cache.strata() as usize,
         fewest,
-        reserve: Audit::bytes::<F>(setup, Method::IrradianceCache.is_biased()),
+        reserve: Audit::bytes::<F>(setup, chosen.is_biased()),
         // Records saved to a file keep their validity radii.
         widens: settings.save_cache.is_none(),
+        lobes: (chosen == Method::RadianceCache).then_some(settings.lobes),
     }
 }
 
@@ -310,8 +353,8 @@ fn scratch<F: Features>(cache: &CacheSettings, has_caustics: bool) -> Footprint 
 
 /// Bytes to leave when caustic photons take memory: for tables, for the fewest records of each cache, and for
 /// the audit.
-fn later(cache: &CacheSettings) -> usize {
-    let records = CacheBuilder::footprint(cache.fewest).bytes().saturating_mul(2);
-    let tables = cache.gathering_footprint().bytes();
+fn later(cache: &CacheSettings, scene: &Scene) -> usize {
+    let records = CacheBuilder::footprint(cache.fewest, cache.degree()).bytes().saturating_mul(2);
+    let tables = cache.gathering_footprint().and(cache.lobe_footprint(scene)).bytes();
     records.saturating_add(tables).saturating_add(cache.reserve)
 }

@@ -16,6 +16,7 @@ mod properties;
 mod wrong;
 
 pub use cache_settings::CacheSettings;
+pub use halflight_core::cache::radiance::LobeSettings;
 pub use halflight_core::method::PhotonSettings;
 pub use photon_view::{MapView, PhotonView};
 pub use properties::Method;
@@ -109,7 +110,9 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
             Attempt::Ready(renderer) => renderer,
             instead => return Ok(instead),
         },
-        Method::IrradianceCache => Box::new(irradiance_cache::Cached::<F>::new(setup, memory)?),
+        Method::IrradianceCache | Method::RadianceCache => {
+            Box::new(irradiance_cache::Cached::<F>::new(method, setup, memory)?)
+        }
         Method::PhotonMap => {
             let scratch = PhotonMapping::<F>::scratch();
             Adapter::<F, _>::boxed(setup, memory, (method, scratch), |memory, executor, reserve| {

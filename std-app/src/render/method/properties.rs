@@ -9,6 +9,8 @@ pub enum Method {
     Path,
     /// Indirect light of diffuse surfaces from an irradiance cache.
     IrradianceCache,
+    /// Irradiance caching, and light of wide lobes from coefficients of incident radiance.
+    RadianceCache,
     /// Photon mapping in two passes, with final gathering.
     PhotonMap,
     /// Stochastic progressive photon mapping.
@@ -76,6 +78,16 @@ const TABLE: &[Properties] = &[
         converges: false,
         may_join_caustics: true,
         settings: |settings| format!(", {:?}", settings.cache),
+        ..UNBIASED
+    },
+    Properties {
+        method: Method::RadianceCache,
+        name: "radiance-cache",
+        about: "irradiance-cache with interpolated light of rough metals and rough coats",
+        is_biased: true,
+        converges: false,
+        may_join_caustics: true,
+        settings: |settings| format!(", {:?}, {:?}", settings.cache, settings.lobes),
         ..UNBIASED
     },
     Properties {
@@ -216,6 +228,11 @@ impl Method {
     /// The part of `settings` that determines a picture of this method and of no other, as text.
     pub(in crate::render) fn own_settings(self, settings: &Settings) -> String {
         (self.properties().settings)(settings)
+    }
+
+    /// True if the method has caches of records, which files keep.
+    pub const fn has_records(self) -> bool {
+        matches!(self, Method::IrradianceCache | Method::RadianceCache)
     }
 
     /// True if its paths may be joined with caustic photons.

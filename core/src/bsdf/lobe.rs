@@ -1,0 +1,56 @@
+//! Rough reflection of a BSDF as the lobe that a radiance cache serves.
+
+use super::Bsdf;
+use super::coated::Coat;
+use crate::Rgb;
+use core::f32::consts::FRAC_1_PI;
+
+/// GGX reflection. A microfacet reflects tint · (f0 F + (1 - f0) (1 - c)⁵), with F = 1 for Schlick's
+/// reflectance, and with the reflectance F of a dielectric, where f0 is 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MicrofacetLobe {
+    /// GGX alpha, above 0.
+    pub(crate) alpha: f32,
+    /// Reflectance at normal incidence.
+    pub(crate) f0: Rgb,
+    /// Factor of the reflectance.
+    pub(crate) tint: Rgb,
+    /// Index of refraction of a dielectric.
+    pub(crate) eta: Option<f32>,
+}
+
+impl Bsdf {
+    /// Rough reflection of a metal or a coat. `None` for smooth and transmitting surfaces, and for a
+    /// dielectric coat that is blended with metal.
+    pub(crate) fn microfacet_lobe(&self) -> Option<MicrofacetLobe> {
+        let lobe = match self {
+            Bsdf::Conductor(b) => MicrofacetLobe { alpha: b.alpha, f0: b.f0, tint: Rgb::ONE, eta: None },
+            Bsdf::Glossy(b) => {
+                MicrofacetLobe { alpha: b.alpha(), f0: b.reflectance(1.0), tint: Rgb::ONE, eta: None }
+            }
+            Bsdf::Plastic(b) => {
+                let tint = b.coat_tint()?;
+                MicrofacetLobe { alpha: b.alpha(), f0: Rgb::ONE, tint, eta: Some(b.eta()) }
+            }
+            _ => return None,
+        };
+        (lobe.alpha > 0.0).then_some(lobe)
+    }
+
+    /// Transmittance of a coat at the cosine `c`.
+    pub(crate) fn transmittance_at(&self, c: f32) -> Rgb {
+        match self {
+            Bsdf::Glossy(b) => b.transmittance(c),
+            Bsdf::Plastic(b) => b.transmittance(c),
+            _ => Rgb::ONE,
+        }
+    }
+
+    /// base · T(θ_o) / π at the viewer's cosine `cos`: factor of ∫ L T(θ_i) cos dω in the radiance of the base. Zero without a coat.
+    pub(crate) fn base_factor(&self, cos: f32) -> Rgb {
+        match self {
+            Bsdf::Glossy(_) | Bsdf::Plastic(_) => self.base() * self.transmittance_at(cos) * FRAC_1_PI,
+            _ => Rgb::ZERO,
+        }
+    }
+}
