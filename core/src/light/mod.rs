@@ -3,6 +3,7 @@
 mod area;
 mod border;
 mod build;
+mod choice;
 mod emission;
 mod emitted;
 mod environment;

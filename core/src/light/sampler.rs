@@ -9,13 +9,11 @@ use super::border::Edges;
 use super::emitted::{emitted_at, spot_falloff};
 use super::environment::EnvironmentSampler;
 use super::environment_visibility::{EnvironmentVisibility, VisibilityTable, WarpedSample};
-use super::tree::{ChosenBlock, Tree};
-use crate::sampling::{AliasTable, ONE_MINUS_EPSILON};
+use super::tree::Tree;
+use crate::sampling::AliasTable;
 use crate::scene::{Mesh, PointLight, Scene};
 use crate::{Level, Rgb};
 use glam::Vec3;
-use halflight_simd::kernels::shade::emitter::EmitterBlock;
-use halflight_simd::kernels::shade::{BLOCK, Row, Row3};
 
 /// Least probability of each kind of light that exists.
 const MIN_PROBABILITY: f32 = 0.1;
@@ -43,7 +41,7 @@ pub struct LightSample {
 
 impl LightSample {
     #[inline]
-    fn far(direction: Vec3, radiance: Rgb, pdf: f32, light: u32) -> Self {
+    pub(super) fn far(direction: Vec3, radiance: Rgb, pdf: f32, light: u32) -> Self {
         Self { direction, distance: f32::INFINITY, target: None, radiance, pdf, delta: false, light }
     }
 }
@@ -79,39 +77,11 @@ pub struct LightSampler<'m> {
     pub(super) distant_weight: f32,
 }
 
-/// Light that [`LightSampler::choose`] chose, with the probability of the choice.
-#[derive(Clone, Copy)]
-pub(crate) enum ChosenLight<'m> {
-    /// Area light number `light`.
-    Emitter { emitter: &'m Emitter, light: u32, probability: f32 },
-    /// Point or spot number `light`.
-    Point { light: u32, probability: f32 },
-    /// The environment.
-    Environment { probability: f32 },
-    /// Directional light number `index`.
-    Distant { index: usize, probability: f32 },
-}
-
-impl ChosenLight<'_> {
-    /// Makes an area light without texture the light of vertex `i` (below 16) of a block. Returns its first
-    /// triangle and the probability of the choice; `None` for other lights.
-    #[inline]
-    pub(crate) fn put(&self, block: &mut EmitterBlock, i: usize) -> Option<(u32, f32)> {
-        match *self {
-            Self::Emitter { emitter, probability, .. } if !emitter.is_textured() => {
-                emitter.put(block, i);
-                Some((emitter.triangle, probability))
-            }
-            _ => None,
-        }
-    }
-}
-
 /// Probability of each kind of light.
-struct KindProbabilities {
-    tree: f32,
-    environment: f32,
-    distant: f32,
+pub(super) struct KindProbabilities {
+    pub(super) tree: f32,
+    pub(super) environment: f32,
+    pub(super) distant: f32,
 }
 
 impl<'m> LightSampler<'m> {
@@ -186,103 +156,6 @@ impl<'m> LightSampler<'m> {
         let [u0, u1, choice] = u;
         let chosen = self.choose(position, normal, choice)?;
         self.sample_chosen(scene, position, normal, [u0, u1], chosen, warped)
-    }
-
-    /// Chooses the light of a sample by the number `choice`.
-    #[inline]
-    pub(crate) fn choose(&self, position: Vec3, normal: Vec3, choice: f32) -> Option<ChosenLight<'m>> {
-        let shares = self.kind_probabilities(position, normal);
-        if choice < shares.tree {
-            let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
-            let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;
-            let probability = probability * shares.tree;
-            return Some(self.light(light, probability));
-        }
-        let choice = choice - shares.tree;
-        if choice < shares.environment {
-            return Some(ChosenLight::Environment { probability: shares.environment });
-        }
-        let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
-        let (index, probability, _) = self.distant_table.sample(choice)?;
-        Some(ChosenLight::Distant { index, probability: probability * shares.distant })
-    }
-
-    /// Chooses lights for the vertices of a block in `active` by the numbers `u`; `None` in scenes with an
-    /// environment or directional lights.
-    #[inline]
-    pub(crate) fn choose_block(&self, places: (&Row3, &Row3), u: &Row, active: u32) -> Option<ChosenBlock> {
-        let is_near = self.environment_weight + self.distant_weight == 0.0;
-        is_near.then(|| self.tree.sample_block(places, u, active))
-    }
-
-    /// Light of vertex `i` of a block.
-    #[inline]
-    pub(crate) fn chosen(&self, block: &ChosenBlock, i: usize) -> ChosenLight<'m> {
-        self.light(block.lights[i % BLOCK], block.probabilities[i % BLOCK])
-    }
-
-    /// Light number `light` of the tree.
-    #[inline]
-    fn light(&self, light: u32, probability: f32) -> ChosenLight<'m> {
-        match self.emitters.get(light as usize) {
-            Some(emitter) => ChosenLight::Emitter { emitter, light, probability },
-            None => ChosenLight::Point { light, probability },
-        }
-    }
-
-    /// Makes the only light, an area light without texture, the light of every vertex of a block. Returns its
-    /// first triangle and the probability of the choice; `None` in other scenes.
-    #[inline]
-    pub(crate) fn put_lone(&self, block: &mut EmitterBlock) -> Option<(u32, f32)> {
-        let [emitter] = self.emitters else { return None };
-        if self.count() > 1 || emitter.is_textured() {
-            return None;
-        }
-        (block.triangles, block.rectangles, block.two_sided) = (0, 0, 0);
-        (0..16).for_each(|i| emitter.put(block, i));
-        Some((emitter.triangle, 1.0))
-    }
-
-    /// [`LightSampler::sample_deferred`] of a chosen light.
-    #[inline]
-    pub(crate) fn sample_chosen(
-        &self,
-        scene: &Scene,
-        position: Vec3,
-        normal: Vec3,
-        u: [f32; 2],
-        chosen: ChosenLight,
-        warped: Option<WarpedSample>,
-    ) -> Option<(LightSample, bool)> {
-        match chosen {
-            ChosenLight::Emitter { emitter, light, probability } => {
-                let sample = sample_emitter(scene, emitter, position, normal, u, probability)?;
-                Some((LightSample { light, ..sample }, false))
-            }
-            ChosenLight::Point { light, probability } => {
-                let sample = self.sample_point(scene, light, position, probability)?;
-                Some((LightSample { light, ..sample }, false))
-            }
-            ChosenLight::Environment { probability } => {
-                let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
-                let (direction, pdf) = match warped {
-                    Some(warped) => sampler.sample_at(environment, warped)?,
-                    None => sampler.sample(environment, normal, u)?,
-                };
-                let light = (self.in_tree() + self.distant.len()) as u32;
-                Some((LightSample::far(direction, Rgb::ONE, pdf * probability, light), true))
-            }
-            ChosenLight::Distant { index, probability } => {
-                let light = (self.in_tree() + index) as u32;
-                match scene.lights.get(*self.distant.get(index)? as usize)? {
-                    PointLight::Directional { direction, irradiance } => {
-                        let sample = LightSample::far(-*direction, *irradiance, probability, light);
-                        Some((LightSample { delta: true, ..sample }, false))
-                    }
-                    _ => None,
-                }
-            }
-        }
     }
 
     /// Density of [`LightSampler::sample`] at a point of emissive `triangle`, in unit `direction` at
@@ -414,13 +287,13 @@ impl<'m> LightSampler<'m> {
     }
 
     #[inline]
-    fn in_tree(&self) -> usize {
+    pub(super) fn in_tree(&self) -> usize {
         self.emitters.len() + self.points.len()
     }
 
     /// Probabilities of the kinds at a point. With a single kind nothing is computed.
     #[inline]
-    fn kind_probabilities(&self, position: Vec3, normal: Vec3) -> KindProbabilities {
+    pub(super) fn kind_probabilities(&self, position: Vec3, normal: Vec3) -> KindProbabilities {
         let (sky, sun) = (self.environment_weight, self.distant_weight);
         if sky + sun == 0.0 {
             return KindProbabilities { tree: 1.0, environment: 0.0, distant: 0.0 };
@@ -438,7 +311,13 @@ impl<'m> LightSampler<'m> {
         KindProbabilities { tree: share(0), environment: share(1), distant: share(2) }
     }
 
-    fn sample_point(&self, scene: &Scene, light: u32, from: Vec3, probability: f32) -> Option<LightSample> {
+    pub(super) fn sample_point(
+        &self,
+        scene: &Scene,
+        light: u32,
+        from: Vec3,
+        probability: f32,
+    ) -> Option<LightSample> {
         let index = *self.points.get(light as usize - self.emitters.len())?;
         let (position, intensity) = match scene.lights.get(index as usize)? {
             PointLight::Point { position, intensity } => (*position, *intensity),
@@ -461,7 +340,7 @@ impl<'m> LightSampler<'m> {
 }
 
 #[inline]
-fn sample_emitter(
+pub(super) fn sample_emitter(
     scene: &Scene,
     emitter: &Emitter,
     from: Vec3,

@@ -100,8 +100,8 @@ impl Camera {
         Ray::new(if self.start.is_some() { start(Vec2::ZERO) } else { self.eye }, through.normalize())
     }
 
-    /// [`Camera::ray`] through sixteen points of the picture, by columns and rows; `None` unless the camera is
-    /// a pinhole at `eye`.
+    /// [`Camera::ray`] through sixteen points of the picture, by columns and rows; `None` unless the camera
+    /// is a pinhole at `eye`.
     #[inline]
     pub(crate) fn rays(
         &self,

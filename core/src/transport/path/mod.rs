@@ -21,6 +21,7 @@ mod block;
 mod connection;
 mod direct;
 pub(in crate::transport) mod estimator;
+mod lanes;
 pub(in crate::transport) mod pixels;
 pub mod reference;
 pub(in crate::transport) mod reuse;

@@ -1,0 +1,139 @@
+//! Lights that samples choose, one by one and for blocks of vertices.
+
+use super::area::Emitter;
+use super::environment_visibility::WarpedSample;
+use super::sampler::{LightSample, LightSampler, sample_emitter};
+use super::tree::ChosenBlock;
+use crate::Rgb;
+use crate::sampling::ONE_MINUS_EPSILON;
+use crate::scene::{PointLight, Scene};
+use glam::Vec3;
+use halflight_simd::kernels::shade::emitter::EmitterBlock;
+use halflight_simd::kernels::shade::{BLOCK, Row, Row3};
+
+/// Light that [`LightSampler::choose`] chose, with the probability of the choice.
+#[derive(Clone, Copy)]
+pub(crate) enum ChosenLight<'m> {
+    /// Area light number `light`.
+    Emitter { emitter: &'m Emitter, light: u32, probability: f32 },
+    /// Point or spot number `light`.
+    Point { light: u32, probability: f32 },
+    /// The environment.
+    Environment { probability: f32 },
+    /// Directional light number `index`.
+    Distant { index: usize, probability: f32 },
+}
+
+impl ChosenLight<'_> {
+    /// Makes an area light without texture the light of vertex `i` (below 16) of a block. Returns its first
+    /// triangle and the probability of the choice; `None` for other lights.
+    #[inline]
+    pub(crate) fn put(&self, block: &mut EmitterBlock, i: usize) -> Option<(u32, f32)> {
+        match *self {
+            Self::Emitter { emitter, probability, .. } if !emitter.is_textured() => {
+                emitter.put(block, i);
+                Some((emitter.triangle, probability))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl<'m> LightSampler<'m> {
+    /// Chooses lights for the vertices of a block in `active` by the numbers `u`; `None` in scenes with an
+    /// environment or directional lights.
+    #[inline]
+    pub(crate) fn choose_block(&self, places: (&Row3, &Row3), u: &Row, active: u32) -> Option<ChosenBlock> {
+        let is_near = self.environment_weight + self.distant_weight == 0.0;
+        is_near.then(|| self.tree.sample_block(places, u, active))
+    }
+
+    /// Light of vertex `i` of a block.
+    #[inline]
+    pub(crate) fn chosen(&self, block: &ChosenBlock, i: usize) -> ChosenLight<'m> {
+        self.light(block.lights[i % BLOCK], block.probabilities[i % BLOCK])
+    }
+
+    /// Light number `light` of the tree.
+    #[inline]
+    pub(super) fn light(&self, light: u32, probability: f32) -> ChosenLight<'m> {
+        match self.emitters.get(light as usize) {
+            Some(emitter) => ChosenLight::Emitter { emitter, light, probability },
+            None => ChosenLight::Point { light, probability },
+        }
+    }
+
+    /// Makes the only light, an area light without texture, the light of every vertex of a block. Returns its
+    /// first triangle and the probability of the choice; `None` in other scenes.
+    #[inline]
+    pub(crate) fn put_lone(&self, block: &mut EmitterBlock) -> Option<(u32, f32)> {
+        let [emitter] = self.emitters else { return None };
+        if self.count() > 1 || emitter.is_textured() {
+            return None;
+        }
+        (block.triangles, block.rectangles, block.two_sided) = (0, 0, 0);
+        (0..16).for_each(|i| emitter.put(block, i));
+        Some((emitter.triangle, 1.0))
+    }
+
+    /// Chooses the light of a sample by the number `choice`.
+    #[inline]
+    pub(crate) fn choose(&self, position: Vec3, normal: Vec3, choice: f32) -> Option<ChosenLight<'m>> {
+        let shares = self.kind_probabilities(position, normal);
+        if choice < shares.tree {
+            let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
+            let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;
+            let probability = probability * shares.tree;
+            return Some(self.light(light, probability));
+        }
+        let choice = choice - shares.tree;
+        if choice < shares.environment {
+            return Some(ChosenLight::Environment { probability: shares.environment });
+        }
+        let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
+        let (index, probability, _) = self.distant_table.sample(choice)?;
+        Some(ChosenLight::Distant { index, probability: probability * shares.distant })
+    }
+
+    /// [`LightSampler::sample_deferred`] of a chosen light.
+    #[inline]
+    pub(crate) fn sample_chosen(
+        &self,
+        scene: &Scene,
+        position: Vec3,
+        normal: Vec3,
+        u: [f32; 2],
+        chosen: ChosenLight,
+        warped: Option<WarpedSample>,
+    ) -> Option<(LightSample, bool)> {
+        match chosen {
+            ChosenLight::Emitter { emitter, light, probability } => {
+                let sample = sample_emitter(scene, emitter, position, normal, u, probability)?;
+                Some((LightSample { light, ..sample }, false))
+            }
+            ChosenLight::Point { light, probability } => {
+                let sample = self.sample_point(scene, light, position, probability)?;
+                Some((LightSample { light, ..sample }, false))
+            }
+            ChosenLight::Environment { probability } => {
+                let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
+                let (direction, pdf) = match warped {
+                    Some(warped) => sampler.sample_at(environment, warped)?,
+                    None => sampler.sample(environment, normal, u)?,
+                };
+                let light = (self.in_tree() + self.distant.len()) as u32;
+                Some((LightSample::far(direction, Rgb::ONE, pdf * probability, light), true))
+            }
+            ChosenLight::Distant { index, probability } => {
+                let light = (self.in_tree() + index) as u32;
+                match scene.lights.get(*self.distant.get(index)? as usize)? {
+                    PointLight::Directional { direction, irradiance } => {
+                        let sample = LightSample::far(-*direction, *irradiance, probability, light);
+                        Some((LightSample { delta: true, ..sample }, false))
+                    }
+                    _ => None,
+                }
+            }
+        }
+    }
+}
