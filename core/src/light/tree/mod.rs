@@ -200,8 +200,8 @@ impl ChosenBlock {
     const NONE: Self = Self { lights: [0; BLOCK], probabilities: [0.0; BLOCK], exists: 0 };
 }
 
-/// Kernel of [`Tree::sample_block`]. All vertices descend level by level, so that the latencies of their steps
-/// overlap.
+/// Kernel of [`Tree::sample_block`]. All vertices descend level by level, so that the latencies of their
+/// steps overlap.
 struct BlockKernel<'t> {
     nodes: &'t [Node],
     points: &'t Row3,
