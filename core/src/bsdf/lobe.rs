@@ -46,7 +46,8 @@ impl Bsdf {
         }
     }
 
-    /// base · T(θ_o) / π at the viewer's cosine `cos`: factor of ∫ L T(θ_i) cos dω in the radiance of the base. Zero without a coat.
+    /// base · T(θ_o) / π at the viewer's cosine `cos`: factor of ∫ L T(θ_i) cos dω in the radiance of the
+    /// base. Zero without a coat.
     pub(crate) fn base_factor(&self, cos: f32) -> Rgb {
         match self {
             Bsdf::Glossy(_) | Bsdf::Plastic(_) => self.base() * self.transmittance_at(cos) * FRAC_1_PI,

@@ -1,5 +1,7 @@
 //! Caches of light: computed at few points and reused at many.
 
+mod hemisphere;
+mod hessian;
 pub mod irradiance;
 mod octree;
 pub mod radiance;

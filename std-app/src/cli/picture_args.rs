@@ -175,7 +175,7 @@ pub(super) struct MethodArgs {
     /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: 256]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
-    /// Expected error of the light from a lobe that records serve, relative to all that leaves [default: 0.02]
+    /// Expected error of light from lobes that records serve, relative to all that leaves [default: 0.02]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Radiance cache")]
     lobe_error: Option<f64>,
     /// Largest degree of the coefficients of a record; lobes that need more are path traced [default: 6]

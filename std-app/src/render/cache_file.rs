@@ -1,4 +1,5 @@
-//! Files of irradiance and radiance caches: gathered once, reused for other views of the scene. Format: docs/cache-file.md.
+//! Files of irradiance and radiance caches: gathered once, reused for other views of the scene. Format:
+//! docs/cache-file.md.
 
 use super::error::FileError;
 use super::sealed::{self, Kind};

@@ -7,8 +7,8 @@
 //! extent of the scene, so that a scene in millimetres is cached as in kilometres.
 
 use super::derivatives::{CellFlux, Derivatives, triangulated, unoccluded};
-use super::hemisphere::Hemisphere;
 use crate::Level;
+use crate::cache::hemisphere::Hemisphere;
 
 /// Rule for the radii.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

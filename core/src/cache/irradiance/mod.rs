@@ -4,22 +4,23 @@
 
 pub mod derivatives;
 mod evaluate;
-mod hemisphere;
 mod lanes;
 pub mod metric;
 mod neighbours;
 mod packet;
 mod record;
+mod reflected;
 mod store;
 mod validity;
 
+pub use super::hemisphere::{Hemisphere, SIDE_MAX};
 pub use super::octree::POINTS;
 pub use derivatives::{CellFlux, Derivatives, Hessian};
-pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use lanes::QueryPoint;
 pub use metric::Metric;
 pub use packet::Points;
 pub use record::{OVERHANG_DISTANCE_FACTOR, OVERHANG_RADIUS_FACTOR, Record, SECTORS};
+pub(crate) use reflected::Viewer;
 pub use store::{CachedIrradiance, GREATEST_DEVIATION, IrradianceCache};
 pub use validity::{Validity, validity};
 

@@ -3,7 +3,7 @@
 //! the exactly clipped shadow of the square; derivatives are its central differences in f64.
 
 use super::derivatives::CellFlux;
-use super::hemisphere::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use crate::memory::{Arena, Line};
 use std::vec;
 use std::vec::Vec;

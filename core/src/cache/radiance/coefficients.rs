@@ -4,7 +4,7 @@ use super::strata::{StrataTables, groups};
 use super::zernike::{COUNT_MAX, count};
 use crate::Level;
 use crate::Rgb;
-use crate::cache::irradiance::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use core::f32::consts::PI;
 use halflight_simd::kernels::outer::Outer;
 

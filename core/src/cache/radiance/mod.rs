@@ -10,7 +10,6 @@
 mod coefficients;
 pub mod derivatives;
 pub mod lobes;
-mod lookup;
 mod mirror;
 mod pool;
 mod record_coefficients;
@@ -22,10 +21,13 @@ mod strata;
 pub mod zernike;
 
 pub use coefficients::Coefficients;
-pub(crate) use lookup::Viewer;
 pub use mirror::mirrored_viewer;
 pub use pool::{CoefficientPool, PooledRecord, Weights};
 pub(crate) use pool::{registers_of, write};
 pub use record_coefficients::RecordCoefficients;
+pub(crate) use served::ServedLobe;
 pub use served::{LobeCensus, LobeSettings, ServedLobes};
 pub use strata::StrataTables;
+
+#[cfg(test)]
+pub(in crate::cache) use rooms::{Sky, with_tables};

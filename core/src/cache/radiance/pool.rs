@@ -2,8 +2,8 @@
 //! from them.
 //!
 //! A record has coefficients over E/√π, which is the coefficient of degree 0, and their gradients over E/√π
-//! times a unit of length, both of which are of the order of 1 in every scene. Gradients stop two degrees below the values:
-//! higher ones add noise and no precision. Degree 6 takes 384 bytes, degree 8 takes 672.
+//! times a unit of length, both of which are of the order of 1 in every scene. Gradients stop two degrees
+//! below the values: higher ones add noise and no precision. Degree 6 takes 384 bytes, degree 8 takes 672.
 
 use super::coefficients::{Coefficients, GROUPS_MAX};
 use super::derivatives::Gradients;

@@ -263,7 +263,7 @@ impl ServedLobe<'_> {
     /// Weights of the coefficients of each channel for a viewer in the local direction `viewer` of the
     /// record. A viewer at another angle than that of the lobe is one of a turned normal: the radiance is
     /// then that for the former angle, times the ratio of the albedos. `None` if records do not serve it.
-    pub(super) fn weights(&self, viewer: Vec3, is_turned: bool) -> Option<[Weights; 3]> {
+    pub(crate) fn weights(&self, viewer: Vec3, is_turned: bool) -> Option<[Weights; 3]> {
         let turned = if is_turned { Some(self.table.lobe(viewer.z, self.of.alpha)?) } else { None };
         let lobe = turned.as_ref().unwrap_or(&self.lobe);
         let coefficients = lobe.turned(viewer.truncate());

@@ -9,7 +9,7 @@
 //! its cost is that the highest degrees are damped: by 3 % at degree 6 and N = 64, by a tenth at N = 32.
 
 use super::zernike::{DEGREE_MAX, count, values_higher};
-use crate::cache::irradiance::SIDE_MAX;
+use crate::cache::hemisphere::SIDE_MAX;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
 

@@ -2,8 +2,9 @@
 //! coats and of served lobes, looked up for a block of vertices at once.
 
 use crate::bsdf::{Bsdf, Features};
+use crate::cache::irradiance::Viewer;
 use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS, Points, QueryPoint};
-use crate::cache::radiance::{RecordCoefficients, ServedLobes, Viewer};
+use crate::cache::radiance::{RecordCoefficients, ServedLobes};
 use crate::scene::SurfacePoint;
 use crate::transport::cached::overhang;
 use crate::transport::path::PathIntegrator;

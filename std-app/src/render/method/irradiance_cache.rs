@@ -1,5 +1,5 @@
-//! Irradiance and radiance caching in the program: caustic photons if a prepass finds that they pay, cache files, and
-//! surveys.
+//! Irradiance and radiance caching in the program: caustic photons if a prepass finds that they pay, cache
+//! files, and surveys.
 
 use super::path;
 use super::photon_view::{self, PhotonView};

@@ -13,7 +13,7 @@
 
 use super::Derivatives;
 use crate::Level;
-use crate::cache::irradiance::hemisphere::{Hemisphere, SIDE_MAX};
+use crate::cache::hemisphere::{Hemisphere, SIDE_MAX};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
 use halflight_simd::kernels::cells::{Borders, Cells};

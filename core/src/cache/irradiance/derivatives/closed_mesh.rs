@@ -5,7 +5,7 @@
 
 use super::Derivatives;
 use crate::Level;
-use crate::cache::irradiance::hemisphere::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use halflight_simd::kernels::mesh::{Mesh, Rule};
 
 /// Irradiance and all its derivatives.

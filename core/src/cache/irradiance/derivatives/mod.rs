@@ -16,11 +16,12 @@ pub use triangulated::triangulated;
 pub use unoccluded::{GRAZING, Unoccluded, unoccluded};
 pub use ward_heckbert::ward_heckbert;
 
-use super::hemisphere::Hemisphere;
+pub use crate::cache::hessian::Hessian;
+
 use crate::Rgb;
+use crate::cache::hemisphere::Hemisphere;
 use crate::light::luminance;
 use core::f32::consts::PI;
-use core::ops::{Add, Mul};
 use glam::Vec2;
 use halflight_simd::kernels::jumps::Sums;
 
@@ -44,31 +45,6 @@ pub struct Derivatives {
     pub harmonic_mean_distance: f32,
     /// Minimum distance, m; infinite without hits.
     pub min_distance: f32,
-}
-
-/// Symmetric 2×2 matrix.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Hessian {
-    /// ∂²/∂x².
-    pub xx: f32,
-    /// ∂²/∂x∂y.
-    pub xy: f32,
-    /// ∂²/∂y².
-    pub yy: f32,
-}
-
-impl Add for Hessian {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self { xx: self.xx + other.xx, xy: self.xy + other.xy, yy: self.yy + other.yy }
-    }
-}
-
-impl Mul<f32> for Hessian {
-    type Output = Self;
-    fn mul(self, by: f32) -> Self {
-        Self { xx: self.xx * by, xy: self.xy * by, yy: self.yy * by }
-    }
 }
 
 impl Derivatives {

@@ -8,7 +8,7 @@
 
 use super::{Derivatives, Hessian, rotation_by_samples};
 use crate::Level;
-use crate::cache::irradiance::hemisphere::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use core::ops::Add;
 use halflight_simd::kernels::edge::{Flux, flux_of};
 use halflight_simd::kernels::mesh::{Mesh, Rule};

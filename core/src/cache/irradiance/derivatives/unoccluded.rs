@@ -13,7 +13,7 @@
 //! reading.)
 
 use super::Hessian;
-use crate::cache::irradiance::hemisphere::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use crate::light::luminance;
 use core::f32::consts::PI;
 use glam::{Vec2, Vec3};

@@ -4,7 +4,7 @@
 
 use super::{Derivatives, rotation_by_samples};
 use crate::Rgb;
-use crate::cache::irradiance::hemisphere::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use crate::sampling::warp::cosine_hemisphere;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::jumps::Sums;

@@ -5,7 +5,7 @@
 use super::super::strata::StrataTables;
 use super::super::zernike::{COUNT_MAX, count, values};
 use super::{GRAZING, Gradients};
-use crate::cache::irradiance::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use core::f32::consts::PI;
 use glam::Vec3;
 

@@ -14,7 +14,7 @@ pub use displaced::displaced;
 pub use unoccluded::{GRAZING, unoccluded};
 
 use super::zernike::COUNT_MAX;
-use crate::cache::irradiance::Hessian;
+use crate::cache::hessian::Hessian;
 use glam::Vec2;
 
 /// Gradients (∂/∂x, ∂/∂y) of the coefficients of each channel in the tangent plane, W/m² per m.

@@ -11,7 +11,7 @@
 use super::super::strata::StrataTables;
 use super::super::zernike::{COUNT_MAX, count, gradients, values};
 use super::Gradients;
-use crate::cache::irradiance::Hemisphere;
+use crate::cache::hemisphere::Hemisphere;
 use core::f32::consts::PI;
 use glam::{Vec2, Vec3};
 

@@ -6,7 +6,7 @@
 
 use super::{COUNT_MAX, ORDER_MAX, count, values};
 use crate::Level;
-use crate::cache::irradiance::{Hemisphere, SIDE_MAX};
+use crate::cache::hemisphere::{Hemisphere, SIDE_MAX};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
 use core::f32::consts::FRAC_PI_4;

@@ -3,9 +3,8 @@
 use super::*;
 use crate::bsdf::{All, Bsdf, Conductor, Glossy, Plastic};
 use crate::cache::irradiance::SECTORS;
-use crate::cache::radiance::rooms::{Sky, with_tables};
 use crate::cache::radiance::{
-    Coefficients, LobeSettings, RecordCoefficients, ServedLobes, registers_of, write,
+    Coefficients, LobeSettings, RecordCoefficients, ServedLobes, Sky, registers_of, with_tables, write,
 };
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Line};

@@ -1,10 +1,7 @@
 //! Interpolation of the radiance that a lobe reflects, from the valid records with coefficients of a cache.
 
-use super::mirror::mirrored_viewer;
-use super::pool::Weights;
-use super::record_coefficients::RecordCoefficients;
-use super::served::ServedLobe;
-use crate::cache::irradiance::{IrradianceCache, QueryPoint, Record};
+use super::{IrradianceCache, QueryPoint, Record};
+use crate::cache::radiance::{RecordCoefficients, ServedLobe, Weights, mirrored_viewer};
 use crate::geometry::Frame;
 use crate::{Level, Rgb};
 use glam::Vec3;
