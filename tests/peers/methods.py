@@ -29,7 +29,7 @@ from scene_file import write_scene
 OUTPUT = ROOT / "tests" / "output" / "methods"
 PROGRAM = os.environ.get("HALFLIGHT", str(ROOT / "target" / "release" / "halflight"))
 SIZE = (128, 128)
-METHODS = ["path", "irradiance-cache", "sppm", "bdpt", "vcm", "mlt", "instant-radiosity", "photon-map", "auto"]
+METHODS = ["path", "irradiance-cache", "radiance-cache", "sppm", "bdpt", "vcm", "mlt", "instant-radiosity", "photon-map", "auto"]
 HARD = Path(__file__).resolve().parent / "scenes" / "hard"
 
 # Scenes, and the method of their references.
