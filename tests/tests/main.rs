@@ -37,6 +37,7 @@ mod report;
 mod reuse;
 mod sampling;
 mod save;
+mod shadow_rays;
 mod sppm;
 mod stops;
 mod table;

@@ -365,7 +365,7 @@ pub(super) fn sample_emitter(
     let target = LightPoint {
         position: place.position,
         normal: if front { plane } else { -plane },
-        error: emitter.error(place.position),
+        error: emitter.error(place.position, from),
     };
     Some(LightSample { distance, target: Some(target), ..LightSample::far(direction, radiance, pdf, 0) })
 }

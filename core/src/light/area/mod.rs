@@ -254,11 +254,14 @@ impl Emitter {
         if cos > 0.0 { distance / (self.area * cos) * distance } else { 0.0 }
     }
 
-    /// Bound of the rounding error in each coordinate of a point of the light.
+    /// Bound of the rounding error in each coordinate of a point of the light, and of the distance at which a
+    /// ray between it and the point `other` hits the light.
     #[inline]
-    pub(super) fn error(&self, position: Vec3) -> f32 {
-        // Three products and two sums of numbers no larger than the corners.
-        4.0 * f32::EPSILON * (Vec3::from(self.origin).abs().max(position.abs())).max_element()
+    pub(super) fn error(&self, position: Vec3, other: Vec3) -> f32 {
+        // Three products and two sums of numbers no larger than the corners; the tracer subtracts the other
+        // point from the corners.
+        let largest = Vec3::from(self.origin).abs().max(position.abs()).max(other.abs());
+        16.0 * f32::EPSILON * largest.max_element()
     }
 
     /// Point at edge coordinates `[a, b]`, and its triangle.

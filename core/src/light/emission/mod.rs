@@ -275,7 +275,7 @@ fn from_surface(
     let plane = Vec3::from(emitter.normal);
     let radiance = emitted_at(scene, emitter, &place, front);
     let normal = if front { plane } else { -plane };
-    let error = emitter.error(place.position);
+    let error = emitter.error(place.position, place.position);
     let way = Frame::from_normal(normal).to_world(cosine_hemisphere(direction));
     let ray = Ray::new(place.position + error * normal, way);
     Some(EmissionSample {

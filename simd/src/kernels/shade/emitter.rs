@@ -159,9 +159,10 @@ pub fn sample<L: Lanes>(
     let pdf = probability * angular.select(by_angle, areal);
     let has_pdf = zero.lt(pdf) & pdf.lt(zero.all(f32::INFINITY));
     let exists = active & shines & zero.lt(distance) & (is_free | zero.lt(faces)) & has_pdf;
-    // Three products and two sums of numbers no larger than the corners.
-    let error =
-        zero.all(4.0 * f32::EPSILON) * vector::largest(vector::max(vector::abs(o), vector::abs(position)));
+    // Three products and two sums of numbers no larger than the corners; the tracer subtracts the other point
+    // from the corners.
+    let largest = vector::max(vector::max(vector::abs(o), vector::abs(position)), vector::abs(from));
+    let error = zero.all(16.0 * f32::EPSILON) * vector::largest(largest);
     let side = vector::select(front, light.normal, vector::negate(light.normal));
     let end = add(position, scale(side, error));
     EmitterSampleLanes { end, direction, pdf, exists, front, second }
