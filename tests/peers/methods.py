@@ -36,7 +36,7 @@ HARD = Path(__file__).resolve().parent / "scenes" / "hard"
 SCENES = {
     "cornell-box-bitterli": "path", "cbox-mitsuba": "path", "living-room": "path", "staircase": "path",
     "sponza-dabrovic": "path", "veach-ajar": "path", "veach-door": "bdpt",
-    "veach-bidir": "bdpt", "lux-causticcube": "vcm", "torus": "sppm", "caustic-glass": "vcm",
+    "veach-bidir": "bdpt", "lux-causticcube": "path", "torus": "sppm", "caustic-glass": "vcm",
     "water-caustic": "sppm", "two-rooms": "bdpt", "glossy": "path", "caustic": "path", "up-light": "path",
     "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "path",
 }
@@ -60,7 +60,7 @@ def reference_method(name):
     """Method of the reference of scene `name`."""
     if not name.startswith("room-"):
         return SCENES[name]
-    return {"door": "bdpt", "spot": "bdpt", "glass ball": "path", "sun": "bdpt"}.get(random_rooms.light(int(name[5:])), "path")
+    return {"door": "bdpt", "spot": "bdpt", "glass ball": "sppm", "sun": "bdpt"}.get(random_rooms.light(int(name[5:])), "path")
 
 
 def render(scene, flags, threads=1):

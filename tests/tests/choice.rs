@@ -72,6 +72,18 @@ fn paths_are_chosen_where_light_comes_directly_and_have_their_bits() {
 }
 
 #[test]
+fn pilots_are_left_out_where_time_suffices_for_a_few_samples() {
+    let floor = floor();
+    let result = |seconds: f64| {
+        chosen(&floor, |settings| settings.stop = Stop { seconds: Some(seconds), ..Stop::default() })
+    };
+    let [short, long] = [1e-3, 0.5].map(result);
+    assert!(short.findings.get("pilots").is_some() && short.findings.get("path_reuse").is_none());
+    assert!(long.findings.get("pilots").is_none() && long.findings.get("path_reuse").is_some());
+    assert!(short.image.pixels.iter().flatten().any(|&value| value > 0.0));
+}
+
+#[test]
 fn path_tracing_renders_within_a_memory_limit_that_the_chosen_method_exceeds() {
     let room = room_with_up_light();
     let paths = render(&room.scene(), Method::Path, SIZE, SPP, |_| ());

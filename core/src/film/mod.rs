@@ -57,6 +57,7 @@ impl<'m> Film<'m> {
     }
 
     /// Pixel in column `x` and row `y` from the upper left; empty outside the picture.
+    #[inline]
     pub fn pixel(&self, x: u32, y: u32) -> Pixel {
         if x >= self.width || y >= self.height {
             return Pixel::default();

@@ -7,10 +7,10 @@
 //! and not in seconds: the choice follows from scene, settings, seed, memory and, where time is limited, the
 //! number of threads.
 
+use super::RenderContext;
 use super::caustics::{self, CausticPathTracing};
 use super::counts::{self, LightPaths};
 use super::executor::{Executor, Passed};
-use super::{RAYS_PER_SECOND, RenderContext};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::estimate::RELMSE_OFFSET;
@@ -33,7 +33,7 @@ const TRIAL_RAYS: f64 = 2.5e5;
 const TRIAL_SHARE: f64 = 0.25;
 const RAYS_PER_SAMPLE: f64 = 8.0;
 
-/// Fewest samples of a pixel for which another method is worth its structures.
+/// Fewest samples of a pixel for which pilots gain more than they cost.
 const FEWEST_SAMPLES: f64 = 4.0;
 
 /// Rays of the pilot of counts, and its greatest fraction of the work.
@@ -75,8 +75,8 @@ const LEAST_GAIN: f64 = 1.4;
 /// End of a picture: the first of these that holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Goal {
-    /// Seconds of all threads together.
-    pub seconds: Option<f64>,
+    /// Rays for which there is time.
+    pub rays: Option<f64>,
     /// Samples per pixel of path tracing; of other methods as many as take the same work.
     pub samples: Option<u32>,
     /// relMSE.
@@ -84,13 +84,16 @@ pub struct Goal {
 }
 
 impl Goal {
+    /// Whether there is time for pilots beside the first samples of `pixels` pixels.
+    pub fn affords_pilots(&self, pixels: usize) -> bool {
+        self.rays.is_none_or(|rays| rays > FEWEST_SAMPLES * RAYS_PER_SAMPLE * pixels as f64)
+    }
+
     /// Whether a trial costs little beside a picture of `pixels` pixels.
     pub fn affords_trial(&self, pixels: usize) -> bool {
-        let time = self.seconds.map(|seconds| seconds * RAYS_PER_SECOND);
         let samples = self.samples.map(|samples| f64::from(samples) * pixels as f64 * RAYS_PER_SAMPLE);
-        let rays = [time, samples].into_iter().flatten().fold(f64::INFINITY, f64::min);
-        let fewest = time.map_or(0.0, |_| FEWEST_SAMPLES * RAYS_PER_SAMPLE * pixels as f64);
-        rays > fewest.max(TRIAL_RAYS / TRIAL_SHARE)
+        let rays = [self.rays, samples].into_iter().flatten().fold(f64::INFINITY, f64::min);
+        rays > TRIAL_RAYS / TRIAL_SHARE && self.affords_pilots(pixels)
     }
 }
 
@@ -218,7 +221,7 @@ impl Trial {
 
     /// Work for each pixel that reaches `goal` by path tracing, in rays.
     fn budget(&self, goal: &Goal) -> f64 {
-        let time = goal.seconds.map(|seconds| seconds * RAYS_PER_SECOND / self.pixels);
+        let time = goal.rays.map(|rays| rays / self.pixels);
         let samples = goal.samples.map(|samples| f64::from(samples) * self.work[0]);
         let error = goal.error.map(|error| self.error_of_paths(1.0) / error);
         [time, samples, error].into_iter().flatten().fold(f64::INFINITY, f64::min)

@@ -11,9 +11,10 @@ const PREPASS_GRACE: Duration = Duration::from_secs(2);
 /// Time after the end that the first sample of each pixel may take, with its preparation.
 const FIRST_SAMPLE_GRACE: Duration = Duration::from_secs(5);
 
-/// Time after the end, and after their start, that the samples of tiles may take of it. A picture of ordinary
-/// size takes less; a larger one is cut then, and its gaps are filled (`gaps.rs`).
-const TILES_GRACE: Duration = Duration::from_millis(500);
+/// Time after the end that the samples of tiles may take of it, and least time for them. A larger picture is
+/// cut then, and its gaps are filled (`gaps.rs`).
+const TILES_GRACE: Duration = Duration::from_millis(100);
+const TILES_TIME: Duration = Duration::from_millis(500);
 
 /// A time limit, an interrupt flag, or both; by default the render never ends.
 #[derive(Default)]
@@ -65,7 +66,7 @@ impl<'w> Deadline<'w> {
 
     /// True if the first samples of tiles, begun at `start`, are to end.
     pub(super) fn ends_samples_since(&self, start: Instant) -> bool {
-        start.elapsed() >= TILES_GRACE && self.has_ended_for(TILES_GRACE)
+        start.elapsed() >= TILES_TIME && self.has_ended_for(TILES_GRACE)
     }
 
     fn has_ended_for(&self, time: Duration) -> bool {
@@ -138,8 +139,8 @@ mod tests {
         let timed = Deadline { deadline: Some(ago(FIRST_SAMPLE_GRACE)), ..Deadline::default() };
         assert!(timed.is_over() && timed.is_late());
         let timed = Deadline { deadline: Some(ago(TILES_GRACE)), ..Deadline::default() };
-        assert!(timed.ends_samples_since(ago(TILES_GRACE)) && !timed.ends_samples_since(Instant::now()));
-        assert!(!Deadline::default().ends_samples_since(ago(TILES_GRACE)));
+        assert!(timed.ends_samples_since(ago(TILES_TIME)) && !timed.ends_samples_since(Instant::now()));
+        assert!(!Deadline::default().ends_samples_since(ago(TILES_TIME)));
         assert!(!Deadline::default().within(Some(1e300)).is_over());
     }
 

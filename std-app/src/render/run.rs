@@ -19,7 +19,8 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::{Census, WithFeatures};
 use halflight_core::film::Tile;
-use halflight_core::findings::Findings;
+use halflight_core::findings::Decision::LeftOut;
+use halflight_core::findings::{Finding, Findings};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::method::{RenderState, Shard};
@@ -107,6 +108,10 @@ impl WithFeatures for Render<'_> {
         let left = settings.stop.seconds.map(|limit| limit - clock.seconds());
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
         let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
+        let affords_pilots = method != Method::Path || plain.goal().affords_pilots(pixels);
+        let without = (!affords_pilots).then(|| without_pilots(settings));
+        let settings = without.as_ref().unwrap_or(settings);
+        let plain = RenderSetup { settings, ..plain };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
         let setup = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let plain = setup.paths::<F>(settings.seed);
@@ -162,7 +167,9 @@ impl WithFeatures for Render<'_> {
                 continue;
             }
             let seconds = Seconds { build, ..done.seconds };
-            let findings = Findings::default().and(visibility).and(done.findings);
+            let pilots =
+                (!affords_pilots).then(|| Finding::new("pilots", LeftOut, "there is too little time"));
+            let findings = Findings::default().and(pilots).and(visibility).and(done.findings);
             return Ok(RenderResult {
                 memory: own.uses(),
                 memory_peak: own.peak(),
@@ -180,6 +187,17 @@ fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
     let is_lost = matches!(done.ending, Ending::Biased | Ending::NoiseFloor);
     let has_time = settings.stop.seconds.is_none_or(|limit| seconds <= 0.5 * limit);
     is_lost && has_time && settings.shard == Shard::WHOLE
+}
+
+/// Settings of a picture whose time suffices for a few samples of each pixel: paths without the structures
+/// that a pilot chooses.
+fn without_pilots(settings: &Settings) -> Settings {
+    Settings {
+        caustics: false,
+        reuse: settings.reuse.or(Some(false)),
+        environment_visibility: settings.environment_visibility.or(Some(false)),
+        ..settings.clone()
+    }
 }
 
 /// Path settings common to all methods.

@@ -2,15 +2,15 @@
 //! predicted error (`core/src/method/choice.rs`).
 
 use super::{Method, Plan, RenderSetup, bidirectional};
+use crate::render::RenderError;
 use crate::render::memory::Memory;
 use crate::render::threads::Threads;
-use crate::render::{RenderError, Stop};
 use halflight_core::bsdf::Features;
 use halflight_core::census::Census;
 use halflight_core::findings::Finding;
 use halflight_core::method::Method as _;
 use halflight_core::method::caustics::CausticPathTracing;
-use halflight_core::method::choice::{Best, Goal, Trial};
+use halflight_core::method::choice::{Best, Trial};
 
 /// Outcome of a choice: the plan of another method, and the reason.
 pub(super) struct Chosen<'a, F> {
@@ -26,7 +26,7 @@ pub(super) fn choose<'a, F: Features>(
     executor: &mut Threads,
 ) -> Result<Option<Chosen<'a, F>>, RenderError> {
     let (context, settings) = (setup.context(), setup.settings);
-    let goal = goal(&settings.stop, setup.workers.count());
+    let goal = setup.goal();
     if !goal.affords_trial(context.pixels()) {
         return Ok(None);
     }
@@ -53,12 +53,6 @@ pub(super) fn choose<'a, F: Features>(
         }
     };
     Ok(Some(Chosen { instead, finding }))
-}
-
-/// The end of the picture by `stop`.
-fn goal(stop: &Stop, threads: usize) -> Goal {
-    let samples = stop.most_samples();
-    Goal { seconds: stop.seconds.map(|seconds| seconds * threads as f64), samples, error: stop.error }
 }
 
 /// Whether a cache could supply light of the scene.

@@ -36,6 +36,7 @@ use halflight_core::findings::{Findings, Value};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Footprint, Line, OutOfMemory};
 use halflight_core::method::caustics::CausticPathTracing;
+use halflight_core::method::choice::Goal;
 use halflight_core::method::counts::Choice;
 use halflight_core::method::instant_radiosity::InstantRadiosity;
 use halflight_core::method::metropolis::Metropolis;
@@ -177,6 +178,12 @@ impl<'a> RenderSetup<'a> {
     pub(super) fn most_rays(&self) -> Option<f64> {
         let seconds = self.settings.stop.seconds?;
         Some(seconds * self.workers.count() as f64 * RAYS_PER_SECOND)
+    }
+
+    /// End of the picture.
+    pub(super) fn goal(&self) -> Goal {
+        let stop = &self.settings.stop;
+        Goal { rays: self.most_rays(), samples: stop.most_samples(), error: stop.error }
     }
 
     /// Context for methods of the core.
