@@ -232,4 +232,5 @@ def main():
     print("\n".join(notes))
 
 
-main()
+if __name__ == "__main__":
+    main()

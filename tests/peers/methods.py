@@ -36,7 +36,7 @@ HARD = Path(__file__).resolve().parent / "scenes" / "hard"
 SCENES = {
     "cornell-box-bitterli": "path", "cbox-mitsuba": "path", "living-room": "path", "staircase": "path",
     "sponza-dabrovic": "path", "veach-ajar": "path", "veach-door": "bdpt",
-    "veach-bidir": "bdpt", "lux-causticcube": "path", "torus": "sppm", "caustic-glass": "vcm",
+    "veach-bidir": "bdpt", "lux-causticcube": "sppm", "torus": "sppm", "caustic-glass": "vcm",
     "water-caustic": "sppm", "two-rooms": "bdpt", "glossy": "path", "caustic": "path", "up-light": "path",
     "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "path",
 }
