@@ -3,12 +3,12 @@
 use crate::numbers::coordinate;
 use arbitrary::{Result, Unstructured};
 use halflight_simd::Level;
-use halflight_simd::kernels::shade::bsdf::{
-    BsdfBlock, Direct, LightBlock, NextBlock, Scatter, ScatterBlock, ShadowBlock,
-};
+use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::{Row, Row3};
 

@@ -7,6 +7,7 @@ use crate::sampling::warp::uniform_triangle;
 use crate::scene::Mesh;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use halflight_simd::kernels::shade;
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, SLIVER};
 use halflight_simd::kernels::shade::rectangle::SphericalRectangle;
 use halflight_simd::kernels::shade::triangle::SphericalTriangle;
@@ -190,12 +191,10 @@ impl Emitter {
     #[inline]
     pub(super) fn put(&self, block: &mut EmitterBlock, i: usize) {
         let i = i & 15;
-        for k in 0..3 {
-            block.origin[k][i] = self.origin[k];
-            block.edges[0][k][i] = self.edges[0][k];
-            block.edges[1][k][i] = self.edges[1][k];
-            block.normal[k][i] = self.normal[k];
-        }
+        shade::put(&mut block.origin, i, self.origin);
+        shade::put(&mut block.edges[0], i, self.edges[0]);
+        shade::put(&mut block.edges[1], i, self.edges[1]);
+        shade::put(&mut block.normal, i, self.normal);
         (block.area[i], block.near[i]) = (self.area, self.near);
         let shape = self.shape();
         block.triangles |= u32::from(shape == Shape::Triangle) << i;

@@ -12,7 +12,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use halflight_simd::kernels::shade::{BLOCK, Row, Row3};
+use halflight_simd::kernels::shade::{self, BLOCK, Row, Row3};
 use halflight_simd::{Kernel, Simd};
 use importance::{GROUPS, LightBounds, LightBounds8};
 
@@ -224,8 +224,8 @@ impl Kernel for BlockKernel<'_> {
             while left != 0 {
                 let i = left.trailing_zeros() as usize % BLOCK;
                 left &= left - 1;
-                let point = Vec3::new(points[0][i], points[1][i], points[2][i]);
-                let normal = Vec3::new(normals[0][i], normals[1][i], normals[2][i]);
+                let point = Vec3::from(shade::at(points, i));
+                let normal = Vec3::from(shade::at(normals, i));
                 let node = nodes.get(at[i] as usize);
                 let stepped = match node {
                     Some(node) => step(simd, node, point, normal, u[i]),

@@ -89,7 +89,7 @@ fn blocks_choose_the_lights_of_their_vertices() {
                     for level in Level::detect().and_below() {
                         let chosen = tree.with_level(level).sample_block((&points, &normals), &u, active);
                         for i in 0..BLOCK {
-                            let point = Vec3::new(points[0][i], points[1][i], points[2][i]);
+                            let point = Vec3::from(shade::at(&points, i));
                             let normal = Vec3::new(0.0, 0.0, normals[2][i]);
                             let alone = tree.sample(point, normal, u[i]).filter(|_| active >> i & 1 == 1);
                             let found = (chosen.exists >> i & 1 == 1)

@@ -7,11 +7,13 @@ use crate::light::LightSample;
 use crate::scene::{Material, SurfacePoint};
 use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
-use halflight_simd::kernels::shade::bsdf::{BsdfBlock, LightBlock, NextBlock, ScatterBlock, ShadowBlock};
+use halflight_simd::kernels::shade::bsdf::BsdfBlock;
+use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
 use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
 use halflight_simd::kernels::shade::surface::SurfaceBlock;
-use halflight_simd::kernels::shade::{Row, Row3};
+use halflight_simd::kernels::shade::{Row, Row3, at, put};
 
 /// Inputs and results of the kernels, and parts of the vertices that only loops use. Rows of vertices that a
 /// stage does not use keep old values.
@@ -76,18 +78,6 @@ impl Set {
     }
 }
 
-/// Vector of vertex `i`.
-#[inline]
-pub(super) fn at(rows: &Row3, i: usize) -> Vec3 {
-    Vec3::new(rows[0][i & 15], rows[1][i & 15], rows[2][i & 15])
-}
-
-/// Stores the vector of vertex `i`.
-#[inline]
-pub(super) fn put(rows: &mut Row3, i: usize, v: [f32; 3]) {
-    (rows[0][i & 15], rows[1][i & 15], rows[2][i & 15]) = (v[0], v[1], v[2]);
-}
-
 static GREY: Material = Material::GREY;
 
 impl<'a> Block<'a> {
@@ -145,10 +135,14 @@ impl<'a> Block<'a> {
         let Self { surface, .. } = self;
         let [tangent, bitangent, normal] = &surface.frame;
         SurfacePoint {
-            position: at(&surface.position, i),
+            position: at(&surface.position, i).into(),
             error: surface.error[i & 15],
-            geometric_normal: at(&surface.geometric_normal, i),
-            frame: Frame { tangent: at(tangent, i), bitangent: at(bitangent, i), normal: at(normal, i) },
+            geometric_normal: at(&surface.geometric_normal, i).into(),
+            frame: Frame {
+                tangent: at(tangent, i).into(),
+                bitangent: at(bitangent, i).into(),
+                normal: at(normal, i).into(),
+            },
             uv: self.uv[i],
             front: surface.front >> i & 1 == 1,
             material: self.material[i],

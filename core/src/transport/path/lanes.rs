@@ -6,7 +6,7 @@
 //! BSDFs other than diffuse and rough metal, lights other than area lights. Both compute the same bits.
 
 use super::PathIntegrator;
-use super::block::{Block, Set, at, put, put_light};
+use super::block::{Block, Set, put_light};
 use super::estimator::LightEstimator;
 use super::shade::Shading;
 use super::sharing::Sharing;
@@ -22,9 +22,11 @@ use crate::transport::wavefront::{BLOCK, TO_ENVIRONMENT, Wavefront};
 use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::{Vec2, Vec3};
-use halflight_simd::kernels::shade::bsdf::{Direct, Scatter};
+use halflight_simd::kernels::shade::direct::Direct;
 use halflight_simd::kernels::shade::emitter::EmitterSamples;
+use halflight_simd::kernels::shade::scatter::Scatter;
 use halflight_simd::kernels::shade::surface::Surfaces;
+use halflight_simd::kernels::shade::{at, put};
 
 impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E, R> {
     /// Shades the vertices of `range` in lanes.
@@ -226,7 +228,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let chosen = lights.choose_block(places, &block.numbers.choice, lit);
         lit &= chosen.as_ref().map_or(lit, |chosen| chosen.exists);
         for i in Set(lit) {
-            let (position, side) = (at(&block.surface.position, i), at(&block.side, i));
+            let (position, side) =
+                (Vec3::from(at(&block.surface.position, i)), Vec3::from(at(&block.side, i)));
             let chosen = match &chosen {
                 Some(chosen) => lights.chosen(chosen, i),
                 None => match lights.choose(position, side, block.numbers.choice[i]) {
@@ -253,8 +256,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             self.sample_areas(block, areas);
         }
         for i in Set(others & block.light.exists) {
-            let wi = block.point(i).frame.to_local(at(&block.light.direction, i));
-            let (f, pdf) = block.others[i].evaluate::<F>(at(&block.surface.wo, i), wi);
+            let wi = block.point(i).frame.to_local(at(&block.light.direction, i).into());
+            let (f, pdf) = block.others[i].evaluate::<F>(at(&block.surface.wo, i).into(), wi);
             put(&mut block.value, i, f.to_array());
             block.pdf[i] = pdf;
         }
@@ -294,8 +297,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             (light.direction, light.end, light.pdf) = (samples.direction, samples.end, samples.pdf);
         } else {
             for i in Set(bright) {
-                put(&mut light.direction, i, at(&samples.direction, i).to_array());
-                put(&mut light.end, i, at(&samples.end, i).to_array());
+                put(&mut light.direction, i, at(&samples.direction, i));
+                put(&mut light.end, i, at(&samples.end, i));
                 light.pdf[i] = samples.pdf[i];
             }
         }
@@ -336,7 +339,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
             let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobe];
-            let Some(sample) = bsdf.sample::<F>(at(&block.surface.wo, i), u) else {
+            let Some(sample) = bsdf.sample::<F>(at(&block.surface.wo, i).into(), u) else {
                 active &= !(1 << i);
                 continue;
             };

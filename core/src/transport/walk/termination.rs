@@ -2,7 +2,7 @@
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample};
-use halflight_simd::kernels::shade::bsdf::CERTAIN_FROM;
+use halflight_simd::kernels::shade::scatter::CERTAIN_FROM;
 
 /// Skipped surfaces after which a path is cut and counted as unfinished. Roulette makes this limit and
 /// [`MAX_VERTICES`] practically unreachable.

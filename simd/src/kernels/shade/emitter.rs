@@ -4,7 +4,7 @@
 use super::rectangle::SphericalRectangle;
 use super::triangle::SphericalTriangle;
 use super::vector::{self, add, scale, sub};
-use super::{Row, Row3, load3, warp};
+use super::{Row, Row3, at, load3, put, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 
@@ -179,12 +179,11 @@ impl EmitterSamples<'_> {
         let mut block = EmitterSampleBlock::EMPTY;
         let EmitterSamples { lights, .. } = self;
         for i in 0..super::BLOCK {
-            let at = |rows: &Row3| [rows[0][i], rows[1][i], rows[2][i]];
             let bit = |bits: u32| bits >> i & 1 == 1;
             let light = EmitterLanes {
-                origin: at(&lights.origin),
-                edges: [at(&lights.edges[0]), at(&lights.edges[1])],
-                normal: at(&lights.normal),
+                origin: at(&lights.origin, i),
+                edges: [at(&lights.edges[0], i), at(&lights.edges[1], i)],
+                normal: at(&lights.normal, i),
                 area: lights.area[i],
                 near: lights.near[i],
                 triangles: bit(lights.triangles),
@@ -193,14 +192,9 @@ impl EmitterSamples<'_> {
             };
             let u = [self.u[0][i], self.u[1][i]];
             let active = bit(self.active);
-            let sample = sample(&light, at(self.from), at(self.normal), u, self.probability[i], active);
-            let put = |rows: &mut Row3, v: [f32; 3]| {
-                rows[0][i] = v[0];
-                rows[1][i] = v[1];
-                rows[2][i] = v[2];
-            };
-            put(&mut block.end, sample.end);
-            put(&mut block.direction, sample.direction);
+            let sample = sample(&light, at(self.from, i), at(self.normal, i), u, self.probability[i], active);
+            put(&mut block.end, i, sample.end);
+            put(&mut block.direction, i, sample.direction);
             block.pdf[i] = sample.pdf;
             block.exists |= u32::from(sample.exists) << i;
             block.front |= u32::from(sample.front) << i;

@@ -6,10 +6,12 @@
 
 pub mod bsdf;
 pub mod camera;
+pub mod direct;
 pub mod emitter;
 pub mod ggx;
 pub mod numbers;
 pub mod rectangle;
+pub mod scatter;
 pub mod surface;
 pub mod triangle;
 pub mod vector;
@@ -28,6 +30,21 @@ pub type Row = [f32; BLOCK];
 
 /// One vector of each vertex, by coordinates.
 pub type Row3 = [Row; 3];
+
+/// Vector of vertex `i`, below 16.
+#[inline(always)]
+#[must_use]
+pub const fn at(rows: &Row3, i: usize) -> [f32; 3] {
+    [rows[0][i & 15], rows[1][i & 15], rows[2][i & 15]]
+}
+
+/// Stores the vector of vertex `i`, below 16.
+#[inline(always)]
+pub const fn put(rows: &mut Row3, i: usize, [x, y, z]: [f32; 3]) {
+    rows[0][i & 15] = x;
+    rows[1][i & 15] = y;
+    rows[2][i & 15] = z;
+}
 
 /// Lanes of a vector from memory.
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Surface points of a block: interpolated position with its error bound, geometric normal, shading frame.
 
 use super::vector::{self, add, cross, negate, scale, sub};
-use super::{Row, Row3, load3, warp};
+use super::{Row, Row3, at, load3, put, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 
@@ -134,23 +134,17 @@ impl Surfaces<'_> {
     pub fn reference(&self) -> SurfaceBlock {
         let mut block = SurfaceBlock::EMPTY;
         for i in 0..super::BLOCK {
-            let at = |rows: &Row3| [rows[0][i], rows[1][i], rows[2][i]];
             let point = surface(
-                [at(&self.corners[0]), at(&self.corners[1]), at(&self.corners[2])],
-                self.normals.map(|n| [at(&n[0]), at(&n[1]), at(&n[2])]),
+                [at(&self.corners[0], i), at(&self.corners[1], i), at(&self.corners[2], i)],
+                self.normals.map(|n| [at(&n[0], i), at(&n[1], i), at(&n[2], i)]),
                 [self.weights[0][i], self.weights[1][i]],
                 [self.rays[i][4], self.rays[i][5], self.rays[i][6]],
             );
-            let put = |rows: &mut Row3, v: [f32; 3]| {
-                rows[0][i] = v[0];
-                rows[1][i] = v[1];
-                rows[2][i] = v[2];
-            };
-            put(&mut block.position, point.position);
-            put(&mut block.geometric_normal, point.geometric_normal);
-            put(&mut block.wo, point.wo);
+            put(&mut block.position, i, point.position);
+            put(&mut block.geometric_normal, i, point.geometric_normal);
+            put(&mut block.wo, i, point.wo);
             for (rows, axis) in block.frame.iter_mut().zip(point.frame) {
-                put(rows, axis);
+                put(rows, i, axis);
             }
             block.error[i] = point.error;
             block.front |= u32::from(point.front) << i;

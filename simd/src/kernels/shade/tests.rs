@@ -1,11 +1,13 @@
 //! Kernels against their scalar references, to the bit in the lanes that exist, on every level.
 
-use super::bsdf::{BsdfBlock, Direct, LightBlock, Scatter, ScatterBlock};
+use super::bsdf::BsdfBlock;
 use super::camera::CameraRays;
+use super::direct::{Direct, LightBlock, ShadowBlock};
 use super::emitter::{EmitterBlock, EmitterSamples};
 use super::numbers::{mix, unit_float};
-use super::surface::Surfaces;
-use super::{Row, Row3};
+use super::scatter::{NextBlock, Scatter, ScatterBlock};
+use super::surface::{SurfaceBlock, Surfaces};
+use super::{Row, Row3, at, put};
 use crate::Level;
 
 /// Random numbers in [0, 1).
@@ -27,15 +29,14 @@ impl Random {
 
     fn directions(&mut self) -> Row3 {
         let mut rows = self.vectors();
-        #[allow(clippy::needless_range_loop, reason = "three rows by one index")]
         for i in 0..16 {
-            let v = [rows[0][i], rows[1][i], rows[2][i]];
+            let v = at(&rows, i);
             let length = libm::sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).max(1e-3);
-            (0..3).for_each(|k| rows[k][i] = v[k] / length);
+            put(&mut rows, i, v.map(|x| x / length));
         }
         // Axis-aligned in some lanes, with zeros of both signs.
-        (rows[0][3], rows[1][3], rows[2][3]) = (0.0, -0.0, -1.0);
-        (rows[0][4], rows[1][4], rows[2][4]) = (-0.0, 1.0, -0.0);
+        put(&mut rows, 3, [0.0, -0.0, -1.0]);
+        put(&mut rows, 4, [-0.0, 1.0, -0.0]);
         rows
     }
 
@@ -45,7 +46,7 @@ impl Random {
 }
 
 fn bits3(rows: &Row3, i: usize) -> [u32; 3] {
-    [0, 1, 2].map(|k| rows[k][i].to_bits())
+    at(rows, i).map(f32::to_bits)
 }
 
 /// Indices of the bits of `set`.
@@ -62,19 +63,19 @@ fn emitters(random: &mut Random) -> EmitterBlock {
     lights.rectangles = random.bits() & !lights.triangles;
     lights.two_sided = random.bits();
     for i in 0..16 {
-        let e0 = [0, 1, 2].map(|k| lights.edges[0][k][i]);
-        let mut e1 = [0, 1, 2].map(|k| lights.edges[1][k][i]);
+        let e0 = at(&lights.edges[0], i);
+        let mut e1 = at(&lights.edges[1], i);
         if lights.rectangles >> i & 1 == 1 {
             // Perpendicular to the first edge.
             let along = (e0[0] * e1[0] + e0[1] * e1[1] + e0[2] * e1[2])
                 / (e0[0] * e0[0] + e0[1] * e0[1] + e0[2] * e0[2]).max(1e-6);
             (0..3).for_each(|k| e1[k] -= along * e0[k]);
-            (0..3).for_each(|k| lights.edges[1][k][i] = e1[k]);
+            put(&mut lights.edges[1], i, e1);
         }
         let across =
             [e0[1] * e1[2] - e0[2] * e1[1], e0[2] * e1[0] - e0[0] * e1[2], e0[0] * e1[1] - e0[1] * e1[0]];
         let area = libm::sqrtf(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-        (0..3).for_each(|k| lights.normal[k][i] = across[k] / area.max(1e-6));
+        put(&mut lights.normal, i, across.map(|x| x / area.max(1e-6)));
         lights.area[i] = area;
     }
     lights.near = random.row(0.0, 8.0);
@@ -90,14 +91,14 @@ fn surface_points_agree_with_the_reference_on_every_level() {
         let weights = [random.row(0.0, 0.5), random.row(0.0, 0.5)];
         let directions = random.directions();
         let rays = core::array::from_fn(|i| {
-            let [x, y, z] = [0, 1, 2].map(|k| directions[k][i]);
+            let [x, y, z] = at(&directions, i);
             [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
         });
         let normals = (round % 2 == 0).then_some(&normals);
         let surfaces = Surfaces { corners: &corners, normals, weights: &weights, rays: &rays };
         let wanted = surfaces.reference();
         for level in Level::detect().and_below() {
-            let mut found = super::surface::SurfaceBlock::EMPTY;
+            let mut found = SurfaceBlock::EMPTY;
             surfaces.compute(level, &mut found);
             assert_eq!((found.front, found.regular), (wanted.front, wanted.regular), "{level:?}");
             for i in lanes(wanted.regular) {
@@ -156,7 +157,7 @@ fn scattering_agrees_with_the_reference_on_every_level() {
         let weights = [random.row(0.0, 0.5), random.row(0.0, 0.5)];
         let directions = random.directions();
         let views = core::array::from_fn(|i| {
-            let [x, y, z] = [0, 1, 2].map(|k| directions[k][i]);
+            let [x, y, z] = at(&directions, i);
             [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
         });
         let surface =
@@ -209,7 +210,7 @@ fn scattering_agrees_with_the_reference_on_every_level() {
         shadows += lit.exists.count_ones();
         rays += next.exists.count_ones();
         for level in Level::detect().and_below() {
-            let mut found = super::bsdf::ShadowBlock::EMPTY;
+            let mut found = ShadowBlock::EMPTY;
             direct.compute(level, &mut found);
             assert_eq!(found.exists, lit.exists, "{level:?}");
             for i in lanes(lit.exists) {
@@ -217,7 +218,7 @@ fn scattering_agrees_with_the_reference_on_every_level() {
                 let contributions = [found.contribution[i], lit.contribution[i]];
                 assert_eq!(contributions[0], contributions[1], "{level:?}");
             }
-            let mut found = super::bsdf::NextBlock::EMPTY;
+            let mut found = NextBlock::EMPTY;
             scatter.compute(level, &mut found);
             assert_eq!(found.exists, next.exists, "{level:?}");
             for i in lanes(next.exists) {

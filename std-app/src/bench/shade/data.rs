@@ -3,14 +3,14 @@
 use core::hint::black_box;
 use halflight_core::Level;
 use halflight_core::sampling::{mix, unit_float};
-use halflight_simd::kernels::shade::bsdf::{
-    BsdfBlock, Direct, LightBlock, NextBlock, Scatter, ScatterBlock, ShadowBlock,
-};
+use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
-use halflight_simd::kernels::shade::{Row, Row3};
+use halflight_simd::kernels::shade::{Row, Row3, at};
 
 /// Kernel by name.
 pub(super) struct Kernel {
@@ -73,7 +73,7 @@ impl Block {
         let weights = [row(0.0, 0.5), row(0.0, 0.5)];
         let ways = [row(-1.0, 1.0), row(-1.0, -0.2), row(-1.0, 1.0)];
         let rays = core::array::from_fn(|i| {
-            let [x, y, z] = [0, 1, 2].map(|k| ways[k][i]);
+            let [x, y, z] = at(&ways, i);
             let length = (x * x + y * y + z * z).sqrt();
             [0.0, 1.0, 0.0, f32::INFINITY, x / length, y / length, z / length, 0.0]
         });

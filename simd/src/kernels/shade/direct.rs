@@ -1,0 +1,209 @@
+//! Next-event estimation at the vertices of a block (Veach 1997, chapter 9): shadow rays of light samples with
+//! their contributions, weighted against BSDF sampling.
+//!
+//! Values of BSDFs without lanes come from the caller.
+
+use super::bsdf::{BsdfBlock, VertexLanes, lane, metal, vertices};
+use super::surface::SurfaceBlock;
+use super::vector::{self, mul, scale, sub};
+use super::{Row, Row3, at, load3};
+use crate::lanes::{Lanes, Mask, Simd, dot};
+use crate::level::{Kernel, Level};
+use core::f32::consts::FRAC_1_PI;
+
+/// Largest `t` of a ray whose direction has its length: just below 1, the `t` of its target.
+pub const BOUNDED: f32 = 1.0 - f32::EPSILON;
+
+/// Light samples of a block.
+#[derive(Clone, Debug)]
+pub struct LightBlock {
+    /// Unit directions to the lights.
+    pub direction: Row3,
+    /// Ends of the shadow rays, if `bounded`.
+    pub end: Row3,
+    /// Densities in solid angle; probabilities of delta lights.
+    pub pdf: Row,
+    /// Unoccluded radiances.
+    pub radiance: Row3,
+    /// Bit `i`: there is a sample.
+    pub exists: u32,
+    /// Bit `i`: the light is at a finite distance.
+    pub bounded: u32,
+    /// Bit `i`: the light has a surface, which may be behind the vertex by rounding.
+    pub area: u32,
+    /// Bit `i`: no path hits the light.
+    pub delta: u32,
+    /// Bit `i`: weighted by the balance heuristic in place of the power heuristic.
+    pub balance: u32,
+}
+
+impl LightBlock {
+    /// No sample.
+    pub const EMPTY: Self = Self {
+        direction: [[0.0; 16]; 3],
+        end: [[0.0; 16]; 3],
+        pdf: [0.0; 16],
+        radiance: [[0.0; 16]; 3],
+        exists: 0,
+        bounded: 0,
+        area: 0,
+        delta: 0,
+        balance: 0,
+    };
+}
+
+/// Next-event estimation of a block.
+#[derive(Debug)]
+pub struct Direct<'b> {
+    /// Vertices.
+    pub surface: &'b SurfaceBlock,
+    /// Their BSDFs.
+    pub bsdf: &'b BsdfBlock,
+    /// Light samples.
+    pub light: &'b LightBlock,
+    /// f |cos| at the sampled directions, for surfaces that are neither diffuse nor rough metals.
+    pub value: &'b Row3,
+    /// Densities of BSDF sampling there.
+    pub pdf: &'b Row,
+    /// Throughputs of the paths.
+    pub throughput: &'b Row3,
+}
+
+/// Shadow rays of a block.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShadowBlock {
+    /// Rays: origin, end, direction, zero. The direction has the length of the ray if the light is bounded.
+    pub rays: [[f32; 8]; 16],
+    /// Unoccluded contributions to the pixels, and zero.
+    pub contribution: [[f32; 4]; 16],
+    /// Bit `i`: there is a ray.
+    pub exists: u32,
+}
+
+impl ShadowBlock {
+    /// No ray.
+    pub const EMPTY: Self = Self { rays: [[0.0; 8]; 16], contribution: [[0.0; 4]; 16], exists: 0 };
+}
+
+/// Light samples over lanes.
+struct LightLanes<L: Lanes> {
+    direction: [L; 3],
+    end: [L; 3],
+    pdf: L,
+    radiance: [L; 3],
+    exists: L::Mask,
+    bounded: L::Mask,
+    area: L::Mask,
+    delta: L::Mask,
+    balance: L::Mask,
+}
+
+/// Shadow rays over lanes.
+struct ShadowLanes<L: Lanes> {
+    origin: [L; 3],
+    end: L,
+    direction: [L; 3],
+    contribution: [L; 3],
+    exists: L::Mask,
+}
+
+/// Weights light samples against BSDF sampling; `given` are f |cos| and density of other surfaces.
+#[inline(always)]
+fn direct<L: Lanes>(
+    vertex: &VertexLanes<L>,
+    light: &LightLanes<L>,
+    (value, density): ([L; 3], L),
+) -> ShadowLanes<L> {
+    let (zero, one) = (density.all(0.0), density.all(1.0));
+    let direction = light.direction;
+    let [tangent, bitangent, normal] = vertex.frame;
+    let wi = [dot(direction, tangent), dot(direction, bitangent), dot(direction, normal)];
+    let lambert = wi[2].max(zero) * zero.all(FRAC_1_PI);
+    let (mut value, mut density) = (
+        vector::select(vertex.diffuse, scale(vertex.reflectance, lambert), value),
+        lambert.select(vertex.diffuse, density),
+    );
+    if (vertex.metal & light.exists).any() {
+        let (f, pdf) = metal(vertex.reflectance, vertex.alpha, vertex.viewer(), wi);
+        value = vector::select(vertex.metal, f, value);
+        density = pdf.select(vertex.metal, density);
+    }
+    let is_black = value[0].eq(zero) & value[1].eq(zero) & value[2].eq(zero);
+    let heights = dot(sub(light.end, vertex.position), vertex.geometric_normal)
+        * dot(direction, vertex.geometric_normal);
+    let exists =
+        light.exists & vertex.sides_agree(wi[2], direction) & !is_black & (!light.area | zero.lt(heights));
+
+    let way = vector::select(light.bounded, sub(light.end, vertex.position), direction);
+    let origin = vertex.origin(way);
+    let ratio = density / light.pdf;
+    let weight = one / (one + ratio.select(light.balance, ratio * ratio));
+    let weight = one.select(light.delta, weight);
+    let contribution = scale(mul(mul(vertex.throughput, value), light.radiance), weight / light.pdf);
+    let direction = vector::select(light.bounded, sub(light.end, origin), direction);
+    let end = zero.all(BOUNDED).select(light.bounded, zero.all(f32::INFINITY));
+    ShadowLanes { origin, end, direction, contribution, exists }
+}
+
+impl Direct<'_> {
+    /// Shadow rays by the instructions of `level`, into `block`.
+    pub fn compute(&self, level: Level, block: &mut ShadowBlock) {
+        level.dispatch(DirectKernel(self, block));
+    }
+
+    /// Scalar reference; equals [`Direct::compute`] to the bit in lanes that exist.
+    pub fn reference(&self) -> ShadowBlock {
+        let mut block = ShadowBlock::EMPTY;
+        for i in 0..super::BLOCK {
+            let bit = |bits: u32| bits >> i & 1 == 1;
+            let light = LightLanes {
+                direction: at(&self.light.direction, i),
+                end: at(&self.light.end, i),
+                pdf: self.light.pdf[i],
+                radiance: at(&self.light.radiance, i),
+                exists: bit(self.light.exists),
+                bounded: bit(self.light.bounded),
+                area: bit(self.light.area),
+                delta: bit(self.light.delta),
+                balance: bit(self.light.balance),
+            };
+            let vertex = lane(self.surface, self.bsdf, self.throughput, i);
+            let ray = direct(&vertex, &light, (at(self.value, i), self.pdf[i]));
+            let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
+            block.rays[i] = [ox, oy, oz, ray.end, dx, dy, dz, 0.0];
+            block.contribution[i] = [r, g, b, 0.0];
+            block.exists |= u32::from(ray.exists) << i;
+        }
+        block
+    }
+}
+
+struct DirectKernel<'k, 'b>(&'k Direct<'b>, &'k mut ShadowBlock);
+
+impl Kernel for DirectKernel<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Direct { surface, bsdf, light, value, pdf, throughput } = self.0;
+        let light = LightLanes {
+            direction: load3(simd, &light.direction),
+            end: load3(simd, &light.end),
+            pdf: simd.load16(&light.pdf),
+            radiance: load3(simd, &light.radiance),
+            exists: simd.mask16(light.exists),
+            bounded: simd.mask16(light.bounded),
+            area: simd.mask16(light.area),
+            delta: simd.mask16(light.delta),
+            balance: simd.mask16(light.balance),
+        };
+        let vertex = vertices(simd, surface, bsdf, throughput);
+        let ray = direct(&vertex, &light, (load3(simd, value), simd.load16(pdf)));
+        let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
+        let zero = simd.splat16(0.0);
+        let block = self.1;
+        simd.octets16([ox, oy, oz, ray.end, dx, dy, dz, zero], &mut block.rays);
+        block.contribution = simd.records16([r, g, b, zero]);
+        block.exists = ray.exists.bits();
+    }
+}

@@ -1,0 +1,205 @@
+//! Next rays of the paths at the vertices of a block: BSDF sampling and Russian roulette.
+//!
+//! Samples of BSDFs without lanes come from the caller.
+
+use super::bsdf::{BsdfBlock, VertexLanes, lane, vertices};
+use super::ggx::{Ggx, schlick};
+use super::surface::SurfaceBlock;
+use super::vector::{self, add, divide, mul, scale};
+use super::{Row, Row3, at, load3, warp};
+use crate::lanes::{Lanes, Mask, Simd, dot};
+use crate::level::{Kernel, Level};
+use core::f32::consts::FRAC_1_PI;
+
+/// Throughput from which a path survives with certainty; below, the probability is proportional to it. There
+/// is no minimum number of segments: early ends of dark paths save the most time
+/// (docs/decisions/0023-russian-roulette.md).
+pub const CERTAIN_FROM: f32 = 0.25;
+
+/// BSDF sampling of a block.
+#[derive(Debug)]
+pub struct Scatter<'b> {
+    /// Vertices.
+    pub surface: &'b SurfaceBlock,
+    /// Their BSDFs.
+    pub bsdf: &'b BsdfBlock,
+    /// Samples of surfaces that are neither diffuse nor rough metals.
+    pub given: &'b ScatterBlock,
+    /// Positions in the unit square.
+    pub u: &'b [Row; 2],
+    /// Numbers of roulette.
+    pub roulette: &'b Row,
+    /// Largest continuation probabilities.
+    pub most: &'b Row,
+    /// Throughputs of the paths.
+    pub throughput: &'b Row3,
+    /// Products of their squared relative indices of refraction.
+    pub eta_squared: &'b Row,
+    /// Bit `i`: path `i` scatters.
+    pub active: u32,
+}
+
+/// Samples of BSDFs that lanes do not sample.
+#[derive(Clone, Debug)]
+pub struct ScatterBlock {
+    /// Local directions.
+    pub direction: Row3,
+    /// f |cos| / pdf.
+    pub weight: Row3,
+    /// Densities, infinite for delta lobes.
+    pub pdf: Row,
+    /// Relative indices of refraction.
+    pub eta: Row,
+}
+
+impl ScatterBlock {
+    /// Zeros.
+    pub const EMPTY: Self =
+        Self { direction: [[0.0; 16]; 3], weight: [[0.0; 16]; 3], pdf: [0.0; 16], eta: [1.0; 16] };
+}
+
+/// Next rays of a block.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NextBlock {
+    /// Rays: origin, infinity, unit direction, zero.
+    pub rays: [[f32; 8]; 16],
+    /// Throughputs behind the vertices, densities of the directions, positions of the vertices, products of
+    /// the squared relative indices of refraction.
+    pub states: [[f32; 8]; 16],
+    /// Shading normals of the vertices, and zero.
+    pub normals: [[f32; 4]; 16],
+    /// Bit `i`: the path continues.
+    pub exists: u32,
+}
+
+impl NextBlock {
+    /// No ray.
+    pub const EMPTY: Self =
+        Self { rays: [[0.0; 8]; 16], states: [[0.0; 8]; 16], normals: [[0.0; 4]; 16], exists: 0 };
+}
+
+/// Inputs of [`scatter`] over lanes.
+struct ScatterLanes<L: Lanes> {
+    direction: [L; 3],
+    weight: [L; 3],
+    pdf: L,
+    eta: L,
+    u: [L; 2],
+    roulette: L,
+    most: L,
+    eta_squared: L,
+    active: L::Mask,
+}
+
+/// Next rays over lanes.
+struct NextLanes<L: Lanes> {
+    origin: [L; 3],
+    direction: [L; 3],
+    throughput: [L; 3],
+    pdf: L,
+    eta_squared: L,
+    exists: L::Mask,
+}
+
+/// Samples BSDFs and plays roulette.
+#[inline(always)]
+fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLanes<L> {
+    let (zero, one) = (given.pdf.all(0.0), given.pdf.all(1.0));
+    let lambert = warp::cosine_hemisphere(given.u);
+    let mut local = vector::select(vertex.diffuse, lambert, given.direction);
+    let mut weight = vector::select(vertex.diffuse, vertex.reflectance, given.weight);
+    let mut pdf = (lambert[2] * zero.all(FRAC_1_PI)).select(vertex.diffuse, given.pdf);
+    let mut exists = given.active;
+    let is_metal = vertex.metal & given.active;
+    if is_metal.any() {
+        let (ggx, wo) = (Ggx::new(vertex.alpha), vertex.viewer());
+        let wi = ggx.sample_reflection(wo, given.u);
+        let h = add(wo, wi);
+        let reflectance = schlick(vertex.reflectance, dot(wo, h) / vector::length(h));
+        local = vector::select(is_metal, wi, local);
+        weight = vector::select(is_metal, scale(reflectance, ggx.reflection_weight(wo, wi)), weight);
+        pdf = ggx.reflection_density(wo, h).select(is_metal, pdf);
+        exists = exists & (!is_metal | zero.lt(wi[2]));
+    }
+    let direction = warp::to_world(vertex.frame, local);
+    let throughput = mul(vertex.throughput, weight);
+    let eta_squared = given.eta_squared * (given.eta * given.eta);
+    let bright = vector::largest(scale(throughput, eta_squared)) / zero.all(CERTAIN_FROM);
+    let survival = bright.min(given.most);
+    let is_certain = !survival.lt(one);
+    let throughput = vector::select(is_certain, throughput, divide(throughput, survival));
+    let is_black = throughput[0].eq(zero) & throughput[1].eq(zero) & throughput[2].eq(zero);
+    let exists = exists
+        & vertex.sides_agree(local[2], direction)
+        & (is_certain | given.roulette.lt(survival))
+        & !is_black;
+    NextLanes { origin: vertex.origin(direction), direction, throughput, pdf, eta_squared, exists }
+}
+
+impl Scatter<'_> {
+    /// Next rays by the instructions of `level`, into `block`.
+    pub fn compute(&self, level: Level, block: &mut NextBlock) {
+        level.dispatch(ScatterKernel(self, block));
+    }
+
+    /// Scalar reference; equals [`Scatter::compute`] to the bit in lanes that exist.
+    pub fn reference(&self) -> NextBlock {
+        let mut block = NextBlock::EMPTY;
+        for i in 0..super::BLOCK {
+            let given = ScatterLanes {
+                direction: at(&self.given.direction, i),
+                weight: at(&self.given.weight, i),
+                pdf: self.given.pdf[i],
+                eta: self.given.eta[i],
+                u: [self.u[0][i], self.u[1][i]],
+                roulette: self.roulette[i],
+                most: self.most[i],
+                eta_squared: self.eta_squared[i],
+                active: self.active >> i & 1 == 1,
+            };
+            let vertex = lane(self.surface, self.bsdf, self.throughput, i);
+            let next = scatter(&vertex, &given);
+            let ([ox, oy, oz], [dx, dy, dz]) = (next.origin, next.direction);
+            block.rays[i] = [ox, oy, oz, f32::INFINITY, dx, dy, dz, 0.0];
+            let ([r, g, b], [x, y, z]) = (next.throughput, vertex.position);
+            block.states[i] = [r, g, b, next.pdf, x, y, z, next.eta_squared];
+            let [nx, ny, nz] = vertex.frame[2];
+            block.normals[i] = [nx, ny, nz, 0.0];
+            block.exists |= u32::from(next.exists) << i;
+        }
+        block
+    }
+}
+
+struct ScatterKernel<'k, 'b>(&'k Scatter<'b>, &'k mut NextBlock);
+
+impl Kernel for ScatterKernel<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Scatter { surface, bsdf, given, u, roulette, most, throughput, eta_squared, active } = self.0;
+        let given = ScatterLanes {
+            direction: load3(simd, &given.direction),
+            weight: load3(simd, &given.weight),
+            pdf: simd.load16(&given.pdf),
+            eta: simd.load16(&given.eta),
+            u: [simd.load16(&u[0]), simd.load16(&u[1])],
+            roulette: simd.load16(roulette),
+            most: simd.load16(most),
+            eta_squared: simd.load16(eta_squared),
+            active: simd.mask16(*active),
+        };
+        let vertex = vertices(simd, surface, bsdf, throughput);
+        let next = scatter(&vertex, &given);
+        let (zero, end) = (simd.splat16(0.0), simd.splat16(f32::INFINITY));
+        let ([ox, oy, oz], [dx, dy, dz]) = (next.origin, next.direction);
+        let ([r, g, b], [x, y, z]) = (next.throughput, vertex.position);
+        let [nx, ny, nz] = vertex.frame[2];
+        let block = self.1;
+        simd.octets16([ox, oy, oz, end, dx, dy, dz, zero], &mut block.rays);
+        simd.octets16([r, g, b, next.pdf, x, y, z, next.eta_squared], &mut block.states);
+        block.normals = simd.records16([nx, ny, nz, zero]);
+        block.exists = next.exists.bits();
+    }
+}
