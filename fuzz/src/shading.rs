@@ -102,21 +102,22 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         exists: active,
         bounded: triangles,
         area: two_sided,
-        delta: flags,
+        alone: flags,
         balance: metal,
     };
     let (value, pdf, throughput) = (rows.vectors(), rows.row(), rows.vectors());
+    let (roulette, most, eta_squared) = (rows.unit(), rows.unit(), rows.row());
     let direct = Direct {
         surface: &surface,
         bsdf: &bsdf,
         light: &light,
         value: &value,
         pdf: &pdf,
+        each: &eta_squared,
         throughput: &throughput,
     };
     let given =
         ScatterBlock { direction: rows.vectors(), weight: rows.vectors(), pdf: rows.row(), eta: rows.row() };
-    let (roulette, most, eta_squared) = (rows.unit(), rows.unit(), rows.row());
     let scatter = Scatter {
         surface: &surface,
         bsdf: &bsdf,
@@ -125,8 +126,10 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         roulette: &roulette,
         most: &most,
         throughput: &throughput,
+        factor: &value,
         eta_squared: &eta_squared,
         active,
+        certain: flags,
     };
     let mut samples = SampleBlock::EMPTY;
     for i in 0..16 {

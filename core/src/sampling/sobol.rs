@@ -51,7 +51,7 @@ impl Sampler {
     /// independent.
     #[inline]
     pub const fn replicate(seed: u32, pixel: u32, replicate: u32, index: u32) -> Self {
-        let place = (seed as u64) << 32 | (pixel ^ replicate << 31) as u64;
+        let place = Self::replicate_place(seed, pixel, replicate);
         Self { key: numbers::place_key(place), reversed_index: index.reverse_bits() }
     }
 
@@ -87,7 +87,13 @@ impl Sampler {
     /// Seed and pixel of sample number `sample`, and its index, for [`numbers::SampleBlock`].
     #[inline]
     pub(crate) const fn place(seed: u32, pixel: u32, sample: u32) -> (u64, u32) {
-        ((seed as u64) << 32 | (pixel ^ (sample & 1) << 31) as u64, sample >> 1)
+        (Self::replicate_place(seed, pixel, sample & 1), sample >> 1)
+    }
+
+    /// Seed and pixel of the points of a replicate, for [`numbers::SampleBlock`].
+    #[inline]
+    pub(crate) const fn replicate_place(seed: u32, pixel: u32, replicate: u32) -> u64 {
+        (seed as u64) << 32 | (pixel ^ replicate << 31) as u64
     }
 }
 

@@ -227,6 +227,11 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
     }
 
     #[inline]
+    fn weighs_samples(&self, bsdf: &Bsdf) -> bool {
+        !bsdf.is_receiver()
+    }
+
+    #[inline]
     fn at_vertex(
         &self,
         (context, settings): (&SceneContext<F>, &PathSettings),

@@ -34,8 +34,13 @@ pub(super) struct Block<'a> {
     pub(super) shadows: ShadowBlock,
     pub(super) next: NextBlock,
     pub(super) throughput: Row3,
+    /// Factors from the light of the paths to that of their pixels.
+    pub(super) factor: Row3,
     pub(super) eta_squared: Row,
     pub(super) most: Row,
+    /// Numbers of light samples, and one over them.
+    pub(super) light_samples: [u32; BLOCK],
+    pub(super) each: Row,
     /// Normals for light sampling; zero if the surface transmits.
     pub(super) side: Row3,
     pub(super) path: [u32; BLOCK],
@@ -49,6 +54,19 @@ pub(super) struct Block<'a> {
     pub(super) lamp: [u32; BLOCK],
     /// True if the only light is in `emitters`, at every vertex.
     pub(super) is_lone: bool,
+}
+
+/// Vertices of a block by the stages that they pass.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Stages {
+    /// Those that scatter in lanes.
+    pub(super) met: u32,
+    /// Those among `met` that take light samples.
+    pub(super) lit: u32,
+    /// Those among `met` whose paths go on.
+    pub(super) onward: u32,
+    /// Those that are shaded one by one.
+    pub(super) single: u32,
 }
 
 /// Set of vertices of a block.
@@ -100,8 +118,11 @@ impl<'a> Block<'a> {
             shadows: ShadowBlock::EMPTY,
             next: NextBlock::EMPTY,
             throughput: [[0.0; BLOCK]; 3],
+            factor: [[1.0; BLOCK]; 3],
             eta_squared: [0.0; BLOCK],
             most: [1.0; BLOCK],
+            light_samples: [1; BLOCK],
+            each: [1.0; BLOCK],
             side: [[0.0; BLOCK]; 3],
             path: [0; BLOCK],
             segments: [1; BLOCK],
@@ -173,6 +194,6 @@ pub(super) fn put_light(
     light.exists |= 1 << i;
     light.bounded |= u32::from(end.is_some()) << i;
     light.area |= u32::from(target.is_some()) << i;
-    light.delta |= u32::from(delta) << i;
+    light.alone |= u32::from(delta) << i;
     light.balance |= u32::from(balance) << i;
 }

@@ -123,7 +123,7 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
     type State: Pod;
     /// Result of the lookup for a vertex.
     type Found: Copy + Default;
-    /// True if the estimator adds nothing, so that vertices are shaded in lanes.
+    /// True if the estimator adds nothing.
     const ADDS_NOTHING: bool = false;
     /// Maximum number of light samples per vertex.
     #[inline]
@@ -135,6 +135,13 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
     /// the base alone.
     #[inline]
     fn separates_coat(&self, _context: &SceneContext<F>, _bsdf: &Bsdf, _found: &Self::Found) -> bool {
+        false
+    }
+
+    /// True if [`Self::weight_light`] and [`Self::scattered`] depend on the samples of `bsdf`. At other BSDFs
+    /// all weights are those of plain path tracing, and vertices are shaded in lanes.
+    #[inline]
+    fn weighs_samples(&self, _bsdf: &Bsdf) -> bool {
         false
     }
 
@@ -218,8 +225,8 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
         weight
     }
 
-    /// Called when the path leaves `vertex` by `sample`. The flag is true for a delta lobe, and for a coat
-    /// that is sampled separately.
+    /// Called when the path leaves `vertex` by `sample`, whose weight is unspecified. The flag is true for a
+    /// delta lobe, and for a coat that is sampled separately.
     #[inline]
     fn scattered(
         &self,
@@ -250,6 +257,11 @@ impl<F: Features, A: LightEstimator<F, State = ()>, B: LightEstimator<F>> LightE
     #[inline]
     fn separates_coat(&self, context: &SceneContext<F>, bsdf: &Bsdf, found: &Self::Found) -> bool {
         self.0.separates_coat(context, bsdf, &found.0) || self.1.separates_coat(context, bsdf, &found.1)
+    }
+
+    #[inline]
+    fn weighs_samples(&self, bsdf: &Bsdf) -> bool {
+        self.0.weighs_samples(bsdf) || self.1.weighs_samples(bsdf)
     }
 
     #[inline]

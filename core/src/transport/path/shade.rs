@@ -7,7 +7,7 @@ use super::block::Block;
 use super::estimator::{EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight};
 use super::sharing::PathMemory;
 use super::sharing::Sharing;
-use crate::bsdf::Features;
+use crate::bsdf::{Bsdf, Features};
 use crate::geometry::{Hit, Ray};
 use crate::light::emitted;
 use crate::sampling::Sampler;
@@ -44,8 +44,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
 
     fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
         // The baseline gains nothing by lanes, as measured with SSE2.
-        let has_lanes = cfg!(target_arch = "x86_64") && self.integrator.context.level > Level::BASELINE;
-        if E::ADDS_NOTHING && !R::IN_CIRCLES && has_lanes {
+        if cfg!(target_arch = "x86_64") && self.integrator.context.level > Level::BASELINE {
             return self.shade_block(wave, range, counters);
         }
         let Self { integrator, memory, .. } = self;
@@ -64,7 +63,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
         for (((vertex, point), found), i) in vertices.iter_mut().zip(&points).zip(&found).zip(range) {
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
             let index = ray.tag as usize;
-            let Some(path) = memory.path(wave, index, &mut none) else { continue };
+            let Some(path) = memory.path(wave.paths, index, &mut none) else { continue };
             match integrator.arrive(path, (&ray, &hit), (point.as_ref(), found), counters) {
                 Ok(met) => *vertex = Some(met),
                 Err(Some(through)) => wave.push_ray(index, through),
@@ -74,7 +73,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
         let mut rests = [const { None }; BLOCK];
         for ((rest, vertex), found) in rests.iter_mut().zip(&vertices).zip(found) {
             let Some(vertex) = vertex else { continue };
-            let Some(path) = memory.path(wave, vertex.path, &mut none) else { continue };
+            let Some(path) = memory.path(wave.paths, vertex.path, &mut none) else { continue };
             *rest = Some(integrator.known(path, vertex, found));
         }
         let lit = || vertices.iter().flatten().zip(rests.iter().flatten());
@@ -89,7 +88,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
             }
         }
         for (vertex, rest) in lit().filter(|(vertex, rest)| !rest.ends || vertex.apart) {
-            let Some(path) = memory.path(wave, vertex.path, &mut none) else { continue };
+            let Some(path) = memory.path(wave.paths, vertex.path, &mut none) else { continue };
             if let Some(ray) = integrator.scatter(path, vertex, rest, counters) {
                 wave.push_ray(vertex.path, ray);
             }
@@ -100,14 +99,14 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
 impl<S, R: Sharing> PathMemory<'_, S, R> {
     /// Path `index` of the wave; `none` replaces missing states.
     #[inline]
-    fn path<'p>(
+    pub(super) fn path<'p>(
         &'p mut self,
-        wave: &'p mut Wavefront,
+        paths: &'p mut [PathState],
         index: usize,
         none: &'p mut (S, R::State),
     ) -> Option<Path<'p, S, R::State>> {
         Some(Path {
-            path: wave.paths.get_mut(index)?,
+            path: paths.get_mut(index)?,
             state: self.states.get_mut(index).unwrap_or(&mut none.0),
             shared: self.shared.get_mut(index).unwrap_or(&mut none.1),
         })
@@ -150,27 +149,49 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         if path.classes.ends_at(&bsdf) {
             return Err(None);
         }
-        if segments > 1 {
-            let from = Vec3::from(path.position);
-            let share = self.estimator.share_left(state, from, (point, &bsdf));
+        self.enter((path, state, shared), point, &bsdf)?;
+        Ok(self.vertex(path, (ray, point), (bsdf, found)))
+    }
+
+    /// Prepares a path to scatter at `point`. `Err` if it ends.
+    #[inline]
+    pub(super) fn enter(
+        &self,
+        (path, state, shared): (&mut PathState, &E::State, &mut R::State),
+        point: &SurfacePoint,
+        bsdf: &Bsdf,
+    ) -> Result<(), Option<Ray>> {
+        if path.segments > 1 {
+            let share = self.estimator.share_left(state, path.position.into(), (point, bsdf));
             if share == 0.0 {
                 return Err(None);
             }
             path.throughput = (share * Rgb::from(path.throughput)).to_array();
         }
-        R::arrive(shared, point, &bsdf, path);
+        R::arrive(shared, point, bsdf, path);
+        Ok(())
+    }
 
+    /// Vertex of `path` at the end of `ray`.
+    #[inline]
+    pub(super) fn vertex<'v>(
+        &self,
+        path: &PathState,
+        (ray, point): (&Ray, &'v SurfacePoint<'a>),
+        (bsdf, found): (Bsdf, &E::Found),
+    ) -> PathVertex<'v, 'a> {
+        let segments = u32::from(path.segments);
         let near = if segments == 1 { self.context.scene.camera.eye } else { path.position.into() };
         let distance = near.distance(point.position);
-        Ok(PathVertex {
+        PathVertex {
             path: ray.tag as usize,
             pixel: path.pixel,
             sample: path.sample,
             point,
-            sampler,
+            sampler: Sampler::new(self.settings.seed, path.pixel, path.sample),
             first: dimension::vertex(segments),
             segments,
-            wo: point.frame.to_local(-direction),
+            wo: point.frame.to_local(-Vec3::from(ray.direction)),
             normal: if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal },
             distance,
             travelled: path.travelled + distance,
@@ -179,7 +200,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             came: path.classes,
             rest: path.classes.behind(&bsdf),
             bsdf,
-        })
+        }
     }
 
     /// Adds radiance of the environment along the escaping ray.
@@ -232,7 +253,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
 
     /// Adds light that the estimator supplies at `vertex`. Returns the light that the path still has to find.
     #[inline]
-    fn known(
+    pub(super) fn known(
         &self,
         Path { path, state, shared }: Path<E::State, R::State>,
         vertex: &PathVertex,
@@ -248,7 +269,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
 
     /// Next ray of the path from `vertex`, if the path survives, to find the `rest` of the light.
     #[inline]
-    fn scatter(
+    pub(super) fn scatter(
         &self,
         Path { path, state, shared }: Path<E::State, R::State>,
         vertex: &PathVertex,

@@ -31,8 +31,8 @@ pub struct LightBlock {
     pub bounded: u32,
     /// Bit `i`: the light has a surface, which may be behind the vertex by rounding.
     pub area: u32,
-    /// Bit `i`: no path hits the light.
-    pub delta: u32,
+    /// Bit `i`: BSDF sampling does not find this light, so that the sample has the whole weight.
+    pub alone: u32,
     /// Bit `i`: weighted by the balance heuristic in place of the power heuristic.
     pub balance: u32,
 }
@@ -47,7 +47,7 @@ impl LightBlock {
         exists: 0,
         bounded: 0,
         area: 0,
-        delta: 0,
+        alone: 0,
         balance: 0,
     };
 }
@@ -65,6 +65,8 @@ pub struct Direct<'b> {
     pub value: &'b Row3,
     /// Densities of BSDF sampling there.
     pub pdf: &'b Row,
+    /// Shares of the samples, one over the number of light samples of the vertices.
+    pub each: &'b Row,
     /// Throughputs of the paths.
     pub throughput: &'b Row3,
 }
@@ -94,7 +96,7 @@ struct LightLanes<L: Lanes> {
     exists: L::Mask,
     bounded: L::Mask,
     area: L::Mask,
-    delta: L::Mask,
+    alone: L::Mask,
     balance: L::Mask,
 }
 
@@ -107,12 +109,14 @@ struct ShadowLanes<L: Lanes> {
     exists: L::Mask,
 }
 
-/// Weights light samples against BSDF sampling; `given` are f |cos| and density of other surfaces.
+/// Weights light samples against BSDF sampling; given are f |cos| and density of other surfaces, and the share
+/// of each sample.
 #[inline(always)]
 fn direct<L: Lanes>(
     vertex: &VertexLanes<L>,
     light: &LightLanes<L>,
     (value, density): ([L; 3], L),
+    each: L,
 ) -> ShadowLanes<L> {
     let (zero, one) = (density.all(0.0), density.all(1.0));
     let direction = light.direction;
@@ -136,9 +140,9 @@ fn direct<L: Lanes>(
 
     let way = vector::select(light.bounded, sub(light.end, vertex.position), direction);
     let origin = vertex.origin(way);
-    let ratio = density / light.pdf;
-    let weight = one / (one + ratio.select(light.balance, ratio * ratio));
-    let weight = one.select(light.delta, weight);
+    let ratio = each * density / light.pdf;
+    let weight = each * (one / (one + ratio.select(light.balance, ratio * ratio)));
+    let weight = each.select(light.alone, weight);
     let contribution = scale(mul(mul(vertex.throughput, value), light.radiance), weight / light.pdf);
     let direction = vector::select(light.bounded, sub(light.end, origin), direction);
     let end = zero.all(BOUNDED).select(light.bounded, zero.all(f32::INFINITY));
@@ -164,11 +168,11 @@ impl Direct<'_> {
                 exists: bit(self.light.exists),
                 bounded: bit(self.light.bounded),
                 area: bit(self.light.area),
-                delta: bit(self.light.delta),
+                alone: bit(self.light.alone),
                 balance: bit(self.light.balance),
             };
             let vertex = lane(self.surface, self.bsdf, self.throughput, i);
-            let ray = direct(&vertex, &light, (at(self.value, i), self.pdf[i]));
+            let ray = direct(&vertex, &light, (at(self.value, i), self.pdf[i]), self.each[i]);
             let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
             block.rays[i] = [ox, oy, oz, ray.end, dx, dy, dz, 0.0];
             block.contribution[i] = [r, g, b, 0.0];
@@ -185,7 +189,7 @@ impl Kernel for DirectKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Direct { surface, bsdf, light, value, pdf, throughput } = self.0;
+        let Direct { surface, bsdf, light, value, pdf, each, throughput } = self.0;
         let light = LightLanes {
             direction: load3(simd, &light.direction),
             end: load3(simd, &light.end),
@@ -194,11 +198,11 @@ impl Kernel for DirectKernel<'_, '_> {
             exists: simd.mask16(light.exists),
             bounded: simd.mask16(light.bounded),
             area: simd.mask16(light.area),
-            delta: simd.mask16(light.delta),
+            alone: simd.mask16(light.alone),
             balance: simd.mask16(light.balance),
         };
         let vertex = vertices(simd, surface, bsdf, throughput);
-        let ray = direct(&vertex, &light, (load3(simd, value), simd.load16(pdf)));
+        let ray = direct(&vertex, &light, (load3(simd, value), simd.load16(pdf)), simd.load16(each));
         let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
         let zero = simd.splat16(0.0);
         let block = self.1;

@@ -203,6 +203,11 @@ impl SampleBlock {
         }
     }
 
+    /// The numbers of the vertices for light samples alone, into `out`.
+    pub fn lights(&self, level: Level, offsets: Offsets, out: &mut VertexNumbers) {
+        level.dispatch(Lights(self, offsets, out));
+    }
+
     /// Scalar reference; equals [`SampleBlock::vertices`] to the bit.
     pub fn reference(&self, offsets: Offsets, chooses: bool) -> VertexNumbers {
         let mut out = VertexNumbers::EMPTY;
@@ -254,6 +259,24 @@ impl<const CHOOSES: bool> Kernel for Vertices<'_, CHOOSES> {
     }
 }
 
+struct Lights<'k>(&'k SampleBlock, Offsets, &'k mut VertexNumbers);
+
+impl Kernel for Lights<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self(samples, Offsets { light, choice, .. }, out) = self;
+        let [x, y] = &mut out.light;
+        for i in 0..BLOCK {
+            let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
+            let index = samples.index[i].reverse_bits();
+            [x[i], y[i]] = pair(key, index, first.wrapping_add(light));
+            out.choice[i] = single(key, index, first.wrapping_add(choice));
+        }
+    }
+}
+
 struct Pairs<'k, const SECOND: bool>(&'k SampleBlock, u32);
 
 impl<const SECOND: bool> Kernel for Pairs<'_, SECOND> {
@@ -292,6 +315,9 @@ mod tests {
             let wanted = samples.reference(offsets, true);
             for level in Level::detect().and_below() {
                 let (mut found, mut plain) = (VertexNumbers::EMPTY, VertexNumbers::EMPTY);
+                let mut lights = VertexNumbers::EMPTY;
+                samples.lights(level, offsets, &mut lights);
+                assert_eq!((lights.light, lights.choice), (wanted.light, wanted.choice), "{level:?}");
                 samples.vertices(level, offsets, true, &mut found);
                 samples.vertices(level, offsets, false, &mut plain);
                 assert_eq!(found, wanted, "{level:?}");

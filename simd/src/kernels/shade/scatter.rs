@@ -6,7 +6,7 @@ use super::bsdf::{BsdfBlock, VertexLanes, lane, vertices};
 use super::ggx::{Ggx, schlick};
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, divide, mul, scale};
-use super::{Row, Row3, at, load3, warp};
+use super::{Row, Row3, at, load3, put, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 use core::f32::consts::FRAC_1_PI;
@@ -33,10 +33,14 @@ pub struct Scatter<'b> {
     pub most: &'b Row,
     /// Throughputs of the paths.
     pub throughput: &'b Row3,
+    /// Factors from the light of the paths to that of their pixels.
+    pub factor: &'b Row3,
     /// Products of their squared relative indices of refraction.
     pub eta_squared: &'b Row,
     /// Bit `i`: path `i` scatters.
     pub active: u32,
+    /// Bit `i`: path `i` survives if it carries light.
+    pub certain: u32,
 }
 
 /// Samples of BSDFs that lanes do not sample.
@@ -68,14 +72,21 @@ pub struct NextBlock {
     pub states: [[f32; 8]; 16],
     /// Shading normals of the vertices, and zero.
     pub normals: [[f32; 4]; 16],
+    /// Local directions of the rays.
+    pub local: Row3,
     /// Bit `i`: the path continues.
     pub exists: u32,
 }
 
 impl NextBlock {
     /// No ray.
-    pub const EMPTY: Self =
-        Self { rays: [[0.0; 8]; 16], states: [[0.0; 8]; 16], normals: [[0.0; 4]; 16], exists: 0 };
+    pub const EMPTY: Self = Self {
+        rays: [[0.0; 8]; 16],
+        states: [[0.0; 8]; 16],
+        normals: [[0.0; 4]; 16],
+        local: [[0.0; 16]; 3],
+        exists: 0,
+    };
 }
 
 /// Inputs of [`scatter`] over lanes.
@@ -87,14 +98,17 @@ struct ScatterLanes<L: Lanes> {
     u: [L; 2],
     roulette: L,
     most: L,
+    factor: [L; 3],
     eta_squared: L,
     active: L::Mask,
+    certain: L::Mask,
 }
 
 /// Next rays over lanes.
 struct NextLanes<L: Lanes> {
     origin: [L; 3],
     direction: [L; 3],
+    local: [L; 3],
     throughput: [L; 3],
     pdf: L,
     eta_squared: L,
@@ -124,16 +138,16 @@ fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLa
     let direction = warp::to_world(vertex.frame, local);
     let throughput = mul(vertex.throughput, weight);
     let eta_squared = given.eta_squared * (given.eta * given.eta);
-    let bright = vector::largest(scale(throughput, eta_squared)) / zero.all(CERTAIN_FROM);
+    let bright = vector::largest(scale(mul(throughput, given.factor), eta_squared)) / zero.all(CERTAIN_FROM);
     let survival = bright.min(given.most);
-    let is_certain = !survival.lt(one);
+    let is_certain = given.certain | !survival.lt(one);
     let throughput = vector::select(is_certain, throughput, divide(throughput, survival));
     let is_black = throughput[0].eq(zero) & throughput[1].eq(zero) & throughput[2].eq(zero);
     let exists = exists
         & vertex.sides_agree(local[2], direction)
         & (is_certain | given.roulette.lt(survival))
         & !is_black;
-    NextLanes { origin: vertex.origin(direction), direction, throughput, pdf, eta_squared, exists }
+    NextLanes { origin: vertex.origin(direction), direction, local, throughput, pdf, eta_squared, exists }
 }
 
 impl Scatter<'_> {
@@ -154,8 +168,10 @@ impl Scatter<'_> {
                 u: [self.u[0][i], self.u[1][i]],
                 roulette: self.roulette[i],
                 most: self.most[i],
+                factor: at(self.factor, i),
                 eta_squared: self.eta_squared[i],
                 active: self.active >> i & 1 == 1,
+                certain: self.certain >> i & 1 == 1,
             };
             let vertex = lane(self.surface, self.bsdf, self.throughput, i);
             let next = scatter(&vertex, &given);
@@ -165,6 +181,7 @@ impl Scatter<'_> {
             block.states[i] = [r, g, b, next.pdf, x, y, z, next.eta_squared];
             let [nx, ny, nz] = vertex.frame[2];
             block.normals[i] = [nx, ny, nz, 0.0];
+            put(&mut block.local, i, next.local);
             block.exists |= u32::from(next.exists) << i;
         }
         block
@@ -178,7 +195,7 @@ impl Kernel for ScatterKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Scatter { surface, bsdf, given, u, roulette, most, throughput, eta_squared, active } = self.0;
+        let Scatter { surface, bsdf, given, u, roulette, most, throughput, eta_squared, .. } = self.0;
         let given = ScatterLanes {
             direction: load3(simd, &given.direction),
             weight: load3(simd, &given.weight),
@@ -187,8 +204,10 @@ impl Kernel for ScatterKernel<'_, '_> {
             u: [simd.load16(&u[0]), simd.load16(&u[1])],
             roulette: simd.load16(roulette),
             most: simd.load16(most),
+            factor: load3(simd, self.0.factor),
             eta_squared: simd.load16(eta_squared),
-            active: simd.mask16(*active),
+            active: simd.mask16(self.0.active),
+            certain: simd.mask16(self.0.certain),
         };
         let vertex = vertices(simd, surface, bsdf, throughput);
         let next = scatter(&vertex, &given);
@@ -200,6 +219,7 @@ impl Kernel for ScatterKernel<'_, '_> {
         simd.octets16([ox, oy, oz, end, dx, dy, dz, zero], &mut block.rays);
         simd.octets16([r, g, b, next.pdf, x, y, z, next.eta_squared], &mut block.states);
         block.normals = simd.records16([nx, ny, nz, zero]);
+        block.local = vector::to_arrays(next.local);
         block.exists = next.exists.bits();
     }
 }

@@ -174,16 +174,18 @@ fn scattering_agrees_with_the_reference_on_every_level() {
             exists: random.bits() & surface.regular,
             bounded: random.bits(),
             area: random.bits(),
-            delta: random.bits() & random.bits(),
+            alone: random.bits() & random.bits(),
             balance: random.bits(),
         };
         let (value, pdf, throughput) = (random.directions(), random.row(0.0, 1.0), random.directions());
+        let (each, factor) = (random.row(0.25, 1.0), [random.row(0.0, 1.0); 3]);
         let direct = Direct {
             surface: &surface,
             bsdf: &bsdf,
             light: &light,
             value: &value,
             pdf: &pdf,
+            each: &each,
             throughput: &throughput,
         };
         let given = ScatterBlock {
@@ -203,8 +205,10 @@ fn scattering_agrees_with_the_reference_on_every_level() {
             roulette: &roulette,
             most: &most,
             throughput: &throughput,
+            factor: &factor,
             eta_squared: &eta_squared,
             active: random.bits() & surface.regular,
+            certain: random.bits() & random.bits(),
         };
         let (lit, next) = (direct.reference(), scatter.reference());
         shadows += lit.exists.count_ones();
@@ -225,6 +229,7 @@ fn scattering_agrees_with_the_reference_on_every_level() {
                 assert_eq!(found.rays[i].map(f32::to_bits), next.rays[i].map(f32::to_bits), "{level:?}");
                 assert_eq!(found.states[i], next.states[i], "{level:?}");
                 assert_eq!(found.normals[i], next.normals[i], "{level:?}");
+                assert_eq!(at(&found.local, i), at(&next.local, i), "{level:?}");
             }
         }
     }

@@ -186,6 +186,7 @@ impl Block {
             light: &self.light,
             value: &self.ones,
             pdf: &self.ones[0],
+            each: &self.ones[0],
             throughput: &self.ones,
         };
         let mut block = ShadowBlock::EMPTY;
@@ -205,8 +206,10 @@ impl Block {
             roulette: &self.numbers.roulette,
             most: &self.ones[0],
             throughput: &self.ones,
+            factor: &self.ones,
             eta_squared: &self.ones[0],
             active: 0xffff,
+            certain: 0,
         };
         let mut block = NextBlock::EMPTY;
         match level {

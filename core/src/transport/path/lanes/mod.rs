@@ -1,0 +1,288 @@
+//! Shading of blocks of vertices in lanes, by the kernels of `halflight_simd::kernels::shade`.
+//!
+//! A stage is either a kernel over all vertices of the block or a loop over them. Loops gather inputs, look
+//! up materials, textures and estimators, and replace the kernels at rare vertices: normal maps, degenerate
+//! triangles, BSDFs other than diffuse and rough metal, lights other than area lights. Vertices at which an
+//! estimator separates the coat or weighs samples are shaded one by one (`path/shade.rs`). Both compute the
+//! same bits.
+
+mod direct;
+mod scatter;
+
+use super::PathIntegrator;
+use super::block::{Block, Set, Stages};
+use super::estimator::{LightEstimator, PathVertex, RemainingLight};
+use super::shade::{Path, Shading};
+use super::sharing::{PathMemory, Sharing};
+use crate::bsdf::{Bsdf, Features};
+use crate::geometry::{Hit, Ray};
+use crate::sampling::Sampler;
+use crate::scene::SurfacePoint;
+use crate::transport::settings::Counters;
+use crate::transport::walk::dimension;
+use crate::transport::wavefront::{BLOCK, Wavefront};
+use bytemuck::Zeroable;
+use core::ops::Range;
+use glam::Vec3;
+use halflight_simd::kernels::shade::put;
+use halflight_simd::kernels::shade::surface::Surfaces;
+
+/// Vertices of a block as an estimator takes them, and the light that it leaves to their paths. None without
+/// an estimator.
+struct Estimated<'v, 'a> {
+    vertices: [Option<(PathVertex<'v, 'a>, RemainingLight)>; BLOCK],
+}
+
+impl<'v, 'a> Estimated<'v, 'a> {
+    /// Vertex `i` and the rest of its light.
+    #[inline]
+    fn at(&self, i: usize) -> Option<&(PathVertex<'v, 'a>, RemainingLight)> {
+        self.vertices[i & 15].as_ref()
+    }
+}
+
+/// Surface points of a block with the results of the lookups of an estimator.
+struct Points<'a, L> {
+    points: [Option<SurfacePoint<'a>>; BLOCK],
+    found: [L; BLOCK],
+}
+
+impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E, R> {
+    /// Shades the vertices of `range` in lanes.
+    pub(super) fn shade_block(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
+        let Self { integrator, memory, block } = self;
+        let PathIntegrator { context, settings, estimator, .. } = integrator;
+        let hits = integrator.gather_block(block, memory, wave, range.clone());
+        if hits == 0 {
+            return;
+        }
+        let mut copies = [Ray::zeroed(); BLOCK];
+        let rays = wave.rays.get(range.start..range.start + BLOCK).unwrap_or_else(|| {
+            let there = &wave.rays[range.clone()];
+            copies.iter_mut().zip(there).for_each(|(copy, ray)| *copy = *ray);
+            &copies
+        });
+        let rays: &[[f32; 8]] = bytemuck::cast_slice(rays);
+        let Some(rays) = rays.first_chunk() else { return };
+        let surfaces = Surfaces {
+            corners: &block.corners,
+            normals: (!context.scene.mesh.normals.is_empty()).then_some(&block.normals),
+            weights: &block.weights,
+            rays,
+        };
+        surfaces.compute(context.level, &mut block.surface);
+        let hits = integrator.complete_points(block, (wave, range.start), hits);
+        let mut points = Points { points: [const { None }; BLOCK], found: [E::Found::default(); BLOCK] };
+        if !E::ADDS_NOTHING {
+            Set(hits).for_each(|i| points.points[i] = Some(block.point(i)));
+            let Points { points, found } = &mut points;
+            estimator.look_up((context, settings), (wave, range.clone()), points, found, counters);
+        }
+        let mut estimated = Estimated { vertices: [const { None }; BLOCK] };
+        let wave_at = (&mut *wave, range.start);
+        let stages =
+            integrator.arrive_in_block((block, memory), wave_at, (&points, hits), &mut estimated, counters);
+        if stages.met != 0 {
+            block.samples.dimension = block.segments.map(dimension::vertex);
+            let chooses = context.lights.has_many_lights();
+            block.samples.vertices(context.level, dimension::OFFSETS, chooses, &mut block.numbers);
+            if !context.lights.is_empty() {
+                integrator.direct_in_block((block, memory), wave, &estimated, stages.lit);
+            }
+        }
+        integrator.direct_singly(memory, wave, &estimated, stages);
+        if stages.met != 0 {
+            integrator.scatter_in_block((block, memory), wave, &estimated, stages.onward, counters);
+        }
+        integrator.scatter_singly(memory, wave, &estimated, stages.single, counters);
+    }
+}
+
+impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+    /// Collects triangles and states of the rays in `range` that hit a surface; adds the environment to the
+    /// paths of the others. Returns the set of hits.
+    #[inline]
+    fn gather_block(
+        &self,
+        block: &mut Block<'a>,
+        memory: &mut PathMemory<E::State, R>,
+        wave: &mut Wavefront,
+        range: Range<usize>,
+    ) -> u32 {
+        let scene = self.context.scene;
+        let mesh = &scene.mesh;
+        let mut none = (E::State::zeroed(), R::State::zeroed());
+        let mut hits = 0;
+        for (i, (ray, hit)) in wave.rays[range.clone()].iter().zip(&wave.hits[range]).enumerate() {
+            let i = i & 15;
+            let index = ray.tag as usize;
+            let Some(Path { path, state, shared }) = memory.path(wave.paths, index, &mut none) else {
+                continue;
+            };
+            R::resume(shared, path);
+            if !hit.is_some() {
+                self.escape(path, state, ray);
+                continue;
+            }
+            let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { continue };
+            let Some(material) = scene.materials.get(triangle.material as usize) else { continue };
+            let [a, b, c] = triangle.vertices;
+            let corner = |vertex: u32| mesh.positions.get(vertex as usize);
+            let (Some(&a), Some(&b), Some(&c)) = (corner(a), corner(b), corner(c)) else { continue };
+            put(&mut block.corners[0], i, a);
+            put(&mut block.corners[1], i, b);
+            put(&mut block.corners[2], i, c);
+            if !mesh.normals.is_empty() {
+                for (rows, vertex) in block.normals.iter_mut().zip(triangle.vertices) {
+                    put(rows, i, mesh.normals.get(vertex as usize).copied().unwrap_or_default());
+                }
+            }
+            (block.weights[0][i], block.weights[1][i]) = (hit.u, hit.v);
+            block.eta_squared[i] = path.eta_squared;
+            (block.samples.place[i], block.samples.index[i]) =
+                Sampler::place(self.settings.seed, path.pixel, path.sample);
+            block.path[i] = ray.tag;
+            block.segments[i] = u32::from(path.segments);
+            block.triangle[i] = hit.triangle;
+            block.material[i] = material;
+            hits |= 1 << i;
+        }
+        hits
+    }
+
+    /// Adds texture coordinates, and points of normal maps and degenerate triangles. Returns the set of
+    /// `hits` with a point; their rays start at `first`.
+    #[inline]
+    fn complete_points(&self, block: &mut Block<'a>, (wave, first): (&Wavefront, usize), hits: u32) -> u32 {
+        let scene = self.context.scene;
+        let mut met = hits;
+        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
+            for i in Set(hits) {
+                let t = scene.mesh.corner_texcoords(block.triangle[i]);
+                let (u, v) = (block.weights[0][i], block.weights[1][i]);
+                block.uv[i] = (1.0 - u - v) * t[0] + u * t[1] + v * t[2];
+            }
+        }
+        let mut special = hits & !block.surface.regular;
+        if F::NORMAL_MAPS {
+            let mapped = |i: &usize| block.material[*i].normal_map.is_some();
+            special |= Set(hits).filter(mapped).fold(0, |set, i| set | 1 << i);
+        }
+        for i in Set(special) {
+            let (ray, hit) = (wave.rays[first + i], wave.hits[first + i]);
+            match self.context.surface_at(&ray, &hit) {
+                Some(point) => block.put_point(i, &point, Vec3::from(ray.direction)),
+                None => met &= !(1 << i),
+            }
+        }
+        met
+    }
+
+    /// Adds emission at the `hits`, whose rays start at `first`, continues behind skipped surfaces, looks up
+    /// BSDFs, and adds the light of the estimator. Returns the scattering vertices.
+    #[inline]
+    fn arrive_in_block<'v>(
+        &self,
+        (block, memory): (&mut Block<'a>, &mut PathMemory<E::State, R>),
+        (wave, first): (&mut Wavefront, usize),
+        (points, hits): (&'v Points<'a, E::Found>, u32),
+        estimated: &mut Estimated<'v, 'a>,
+        counters: &mut Counters,
+    ) -> Stages {
+        let mut none = (E::State::zeroed(), R::State::zeroed());
+        let mut stages = Stages::default();
+        (block.bsdf.diffuse, block.bsdf.metal) = (0, 0);
+        for i in Set(hits) {
+            let index = block.path[i] as usize;
+            let Some(mut path) = memory.path(wave.paths, index, &mut none) else { continue };
+            let ray = wave.rays[first + i];
+            let bsdf = match self.arrive_at(block, i, &mut path, (&ray, &wave.hits[first + i]), counters) {
+                Ok(bsdf) => bsdf,
+                Err(Some(through)) => {
+                    // At most in place of this ray: later ones are still read.
+                    wave.push_ray(index, through);
+                    continue;
+                }
+                Err(None) => continue,
+            };
+            put(&mut block.throughput, i, path.path.throughput);
+            let one = 1 << i;
+            if E::ADDS_NOTHING {
+                path.path.classes = path.path.classes.behind(&bsdf);
+            } else if let Some(point) = &points.points[i] {
+                let found = points.found[i];
+                let vertex = self.vertex(path.path, (&ray, point), (bsdf, &found));
+                let rest = self.known(path, &vertex, found);
+                let is_single = vertex.apart || self.estimator.weighs_samples(&bsdf);
+                (block.light_samples[i], block.each[i]) =
+                    (rest.light_samples, 1.0 / rest.light_samples as f32);
+                if is_single {
+                    stages.single |= one;
+                } else {
+                    stages.onward |= if rest.ends { 0 } else { one };
+                    stages.lit |= if rest.is_lit { 0 } else { one };
+                }
+                estimated.vertices[i] = Some((vertex, rest));
+                if is_single {
+                    continue;
+                }
+            }
+            stages.met |= one;
+            match bsdf {
+                Bsdf::Diffuse(b) => {
+                    put(&mut block.bsdf.reflectance, i, b.reflectance.to_array());
+                    block.bsdf.diffuse |= one;
+                }
+                Bsdf::Conductor(b) if F::GLOSSY && b.alpha > 0.0 => {
+                    put(&mut block.bsdf.reflectance, i, b.f0.to_array());
+                    block.bsdf.alpha[i] = b.alpha;
+                    block.bsdf.metal |= one;
+                }
+                _ => block.others[i] = bsdf,
+            }
+        }
+        if E::ADDS_NOTHING {
+            (stages.lit, stages.onward) = (stages.met, stages.met);
+        }
+        stages
+    }
+
+    /// Adds emission at vertex `i`, the `hit` of `ray`, and looks up its BSDF. `Err` if the path does not
+    /// scatter there: the next ray behind a skipped surface, or `None` if the path ends.
+    #[inline]
+    fn arrive_at(
+        &self,
+        block: &Block<'a>,
+        i: usize,
+        Path { path, state, shared }: &mut Path<E::State, R::State>,
+        (ray, hit): (&Ray, &Hit),
+        counters: &mut Counters,
+    ) -> Result<Bsdf, Option<Ray>> {
+        let (segments, triangle) = (block.segments[i], block.triangle[i]);
+        let (material, front) = (block.material[i], block.surface.front >> i & 1 == 1);
+        let is_cutout = F::CUTOUT && material.has_cutout();
+        if triangle == path.triangle || is_cutout || segments == 1 && !front {
+            let point = block.point(i);
+            let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
+            let opacity = || sampler.single(dimension::opacity(segments, u32::from(path.crossings)));
+            if segments == 1 && point.is_left_by(ray)
+                || self.context.is_skipped(&point, hit, path.triangle, opacity)
+            {
+                let through = point.spawn(ray.direction.into());
+                return Err(path.skip_surface(through, triangle, counters));
+            }
+        }
+        if material.emits() {
+            self.emission(path, state, &block.point(i), ray.direction.into());
+        }
+        if segments >= self.settings.max_depth {
+            return Err(None);
+        }
+        let bsdf = Bsdf::at::<F>(self.context.scene, material, block.uv[i], front);
+        if path.classes.ends_at(&bsdf) {
+            return Err(None);
+        }
+        self.enter((path, state, shared), &block.point(i), &bsdf)?;
+        Ok(bsdf)
+    }
+}
