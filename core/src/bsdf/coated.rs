@@ -96,11 +96,28 @@ pub(super) fn evaluate_apart(coat: &impl Coat, wo: Vec3, wi: Vec3, base_weight: 
     [of_base, (coat_value(coat, wo, wi), density)]
 }
 
+/// Part of a coat that depends on the viewer alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct CoatView {
+    /// T(θ_o).
+    transmittance: Rgb,
+    /// Probability of the coat in the choice of the lobe.
+    probability: f32,
+}
+
+impl CoatView {
+    /// `coat`, seen at the cosine `c`.
+    #[inline]
+    pub(super) fn of(coat: &impl Coat, c: f32) -> Self {
+        let transmittance = coat.transmittance(c);
+        Self { transmittance, probability: coat.coat_probability(c, transmittance, 1.0) }
+    }
+}
+
 /// See [`super::Bsdf::sample`].
 #[inline]
-pub(super) fn sample(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-    let transmittance_o = coat.transmittance(wo.z);
-    let p = coat.coat_probability(wo.z, transmittance_o, 1.0);
+pub(super) fn sample(coat: &impl Coat, view: CoatView, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+    let CoatView { transmittance: transmittance_o, probability: p } = view;
     let smooth = coat.alpha() == 0.0;
     if u[2] < p {
         if smooth {
@@ -120,12 +137,11 @@ pub(super) fn sample(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<BsdfSamp
 
 /// See [`super::Bsdf::evaluate`].
 #[inline]
-pub(super) fn evaluate(coat: &impl Coat, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+pub(super) fn evaluate(coat: &impl Coat, view: CoatView, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
     if !(wi.z > 0.0) {
         return (Rgb::ZERO, 0.0);
     }
-    let transmittance_o = coat.transmittance(wo.z);
-    both_lobes(coat, wo, wi, transmittance_o, coat.coat_probability(wo.z, transmittance_o, 1.0))
+    both_lobes(coat, wo, wi, view.transmittance, view.probability)
 }
 
 /// f cos θ_i of the base.

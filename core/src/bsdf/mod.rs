@@ -26,6 +26,7 @@ mod rough_dielectric;
 
 pub use crate::features::{All, DiffuseOnly, DiffuseTextured, Features, Only, Opaque};
 pub(crate) use base::CoatTransmittance;
+pub(crate) use coated::CoatView;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
@@ -119,13 +120,24 @@ impl Bsdf {
     /// `u[2]` chooses the lobe. `None`: absorbed.
     #[inline]
     pub fn sample<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        self.sample_seen::<F>(self.coat_view::<F>(wo), wo, u)
+    }
+
+    /// [`Bsdf::sample`] with a known [`Bsdf::coat_view`].
+    #[inline]
+    pub(crate) fn sample_seen<F: Features>(
+        &self,
+        view: CoatView,
+        wo: Vec3,
+        u: [f32; 3],
+    ) -> Option<BsdfSample> {
         let wo = above_horizon(wo);
         match self {
             Bsdf::Diffuse(b) => b.sample([u[0], u[1]]),
             Bsdf::Mirror(b) if F::GLOSSY => b.sample(wo),
             Bsdf::Conductor(b) if F::GLOSSY => b.sample(wo, [u[0], u[1]]),
-            Bsdf::Glossy(b) if F::GLOSSY => coated::sample(b, wo, u),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::sample(b, wo, u),
+            Bsdf::Glossy(b) if F::GLOSSY => coated::sample(b, view, wo, u),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::sample(b, view, wo, u),
             Bsdf::Dielectric(b) if F::DIELECTRIC => b.sample(wo, u[2]),
             Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.sample(wo, u),
             _ => None,
@@ -135,14 +147,36 @@ impl Bsdf {
     /// f(wo, wi) |cos θ_i|, and the density of [`Bsdf::sample`] at `wi`. Zeros for delta lobes.
     #[inline]
     pub fn evaluate<F: Features>(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        if let Bsdf::Glossy(_) | Bsdf::Plastic(_) = self
+            && !(wi.z > 0.0)
+        {
+            return (Rgb::ZERO, 0.0);
+        }
+        self.evaluate_seen::<F>(self.coat_view::<F>(wo), wo, wi)
+    }
+
+    /// [`Bsdf::evaluate`] with a known [`Bsdf::coat_view`].
+    #[inline]
+    pub(crate) fn evaluate_seen<F: Features>(&self, view: CoatView, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         let wo = above_horizon(wo);
         match self {
             Bsdf::Diffuse(b) => b.evaluate(wi),
             Bsdf::Conductor(b) if F::GLOSSY => b.evaluate(wo, wi),
-            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate(b, wo, wi),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate(b, wo, wi),
+            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate(b, view, wo, wi),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate(b, view, wo, wi),
             Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.evaluate(wo, wi),
             _ => (Rgb::ZERO, 0.0),
+        }
+    }
+
+    /// Part of a coat that depends on the viewer alone, for light samples and a BSDF sample of one vertex.
+    #[inline]
+    pub(crate) fn coat_view<F: Features>(&self, wo: Vec3) -> CoatView {
+        let c = above_horizon(wo).z;
+        match self {
+            Bsdf::Glossy(b) if F::GLOSSY => CoatView::of(b, c),
+            Bsdf::Plastic(b) if F::GLOSSY => CoatView::of(b, c),
+            _ => CoatView::default(),
         }
     }
 

@@ -78,9 +78,8 @@ impl Texture<'_> {
         let (y0, y1, fy) = self.wrap.neighbours(1.0 - uv.y, self.height);
         let (top, bottom) = (y0 as usize * self.width as usize, y1 as usize * self.width as usize);
         let (x0, x1) = (x0 as usize, x1 as usize);
-        let upper = self.texel(top + x0).lerp(self.texel(top + x1), fx);
-        let lower = self.texel(bottom + x0).lerp(self.texel(bottom + x1), fx);
-        upper.lerp(lower, fy).to_array()
+        let [a, b, c, d] = self.four([top + x0, top + x1, bottom + x0, bottom + x1]);
+        a.lerp(b, fx).lerp(c.lerp(d, fx), fy).to_array()
     }
 
     /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates, for height
@@ -99,19 +98,21 @@ impl Texture<'_> {
         self.texel(y.saturating_mul(self.width as usize).saturating_add(x)).to_array()
     }
 
+    /// Linear texels at four indices; white where there is none. The kind of texel decides once, so that the
+    /// memory accesses of all four overlap.
+    #[inline]
+    fn four(&self, [a, b, c, d]: [usize; 4]) -> [Vec4; 4] {
+        match self.texels {
+            Texels::Srgb8(texels) => [srgb(texels, a), srgb(texels, b), srgb(texels, c), srgb(texels, d)],
+            _ => [self.texel(a), self.texel(b), self.texel(c), self.texel(d)],
+        }
+    }
+
     /// Linear texel at `index`; white if it does not exist.
     #[inline]
     fn texel(&self, index: usize) -> Vec4 {
         match self.texels {
-            Texels::Srgb8(texels) => match texels.get(index) {
-                Some(&[r, g, b, a]) => Vec4::new(
-                    SRGB_TO_LINEAR[r as usize],
-                    SRGB_TO_LINEAR[g as usize],
-                    SRGB_TO_LINEAR[b as usize],
-                    f32::from(a) / 255.0,
-                ),
-                None => Vec4::ONE,
-            },
+            Texels::Srgb8(texels) => srgb(texels, index),
             Texels::Linear8(texels) => match texels.get(index) {
                 Some(&[r, g, b, a]) => Vec4::new(r.into(), g.into(), b.into(), a.into()) / 255.0,
                 None => Vec4::ONE,
@@ -120,6 +121,14 @@ impl Texture<'_> {
             Texels::Number(texels) => texels.get(index).map_or(Vec4::ONE, |&number| Vec4::splat(number)),
         }
     }
+}
+
+/// Linear texel number `index` of sRGB; white if it does not exist.
+#[inline(always)]
+fn srgb(texels: &[[u8; 4]], index: usize) -> Vec4 {
+    let Some(&[r, g, b, a]) = texels.get(index) else { return Vec4::ONE };
+    let linear = |byte: u8| SRGB_TO_LINEAR[byte as usize];
+    Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
 }
 
 impl Wrap {

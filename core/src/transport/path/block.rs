@@ -1,7 +1,7 @@
 //! Block of sixteen vertices in structures of arrays: inputs and results of the shading kernels.
 
 use crate::Rgb;
-use crate::bsdf::{Bsdf, Diffuse};
+use crate::bsdf::{Bsdf, CoatView, Diffuse};
 use crate::geometry::Frame;
 use crate::light::LightSample;
 use crate::scene::{Material, SurfacePoint};
@@ -50,6 +50,8 @@ pub(super) struct Block<'a> {
     pub(super) uv: [Vec2; BLOCK],
     /// BSDFs that lanes do not evaluate.
     pub(super) others: [Bsdf; BLOCK],
+    /// Their coats for the viewers.
+    pub(super) coats: [CoatView; BLOCK],
     /// First triangles of the sampled area lights.
     pub(super) lamp: [u32; BLOCK],
     /// True if the only light is in `emitters`, at every vertex.
@@ -130,6 +132,7 @@ impl<'a> Block<'a> {
             material: [&GREY; BLOCK],
             uv: [Vec2::ZERO; BLOCK],
             others: [Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }); BLOCK],
+            coats: [CoatView::default(); BLOCK],
             lamp: [0; BLOCK],
             is_lone: false,
         }

@@ -79,7 +79,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let environment = self.sample_lights(block, lit);
         for i in Set(others & block.light.exists) {
             let wi = block.point(i).frame.to_local(at(&block.light.direction, i).into());
-            let (f, pdf) = block.others[i].evaluate::<F>(at(&block.surface.wo, i).into(), wi);
+            let (f, pdf) =
+                block.others[i].evaluate_seen::<F>(block.coats[i], at(&block.surface.wo, i).into(), wi);
             put(&mut block.value, i, f.to_array());
             block.pdf[i] = pdf;
         }

@@ -24,8 +24,8 @@ use crate::transport::wavefront::{BLOCK, Wavefront};
 use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::Vec3;
-use halflight_simd::kernels::shade::put;
 use halflight_simd::kernels::shade::surface::Surfaces;
+use halflight_simd::kernels::shade::{at, put};
 
 /// Vertices of a block as an estimator takes them, and the light that it leaves to their paths. None without
 /// an estimator.
@@ -83,7 +83,9 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E
         let stages =
             integrator.arrive_in_block((block, memory), wave_at, (&points, hits), &mut estimated, counters);
         if stages.met != 0 {
-            block.samples.dimension = block.segments.map(dimension::vertex);
+            for (first, segments) in block.samples.dimension.iter_mut().zip(block.segments) {
+                *first = dimension::vertex(segments);
+            }
             let chooses = context.lights.has_many_lights();
             block.samples.vertices(context.level, dimension::OFFSETS, chooses, &mut block.numbers);
             if !context.lights.is_empty() {
@@ -238,7 +240,10 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                     block.bsdf.alpha[i] = b.alpha;
                     block.bsdf.metal |= one;
                 }
-                _ => block.others[i] = bsdf,
+                _ => {
+                    block.coats[i] = bsdf.coat_view::<F>(at(&block.surface.wo, i).into());
+                    block.others[i] = bsdf;
+                }
             }
         }
         if E::ADDS_NOTHING {

@@ -103,7 +103,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
             let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobe];
             let wo = at(&block.surface.wo, i).into();
-            let Some(sample) = bsdf.sample::<F>(wo, u) else {
+            let Some(sample) = bsdf.sample_seen::<F>(block.coats[i], wo, u) else {
                 sets.active &= !(1 << i);
                 continue;
             };
