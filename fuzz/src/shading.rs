@@ -172,11 +172,15 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         scatter.compute(level, &mut found);
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check_records("ray", wanted.exists, &found.rays, &wanted.rays);
+        check("local direction", wanted.exists, &found.local, &wanted.local);
         check_records("state", wanted.exists, &found.states, &wanted.states);
 
         let mut found = VertexNumbers::EMPTY;
         samples.vertices(level, offsets, true, &mut found);
         assert_eq!(found, samples.reference(offsets, true), "{level:?}");
+        let mut lights = VertexNumbers::EMPTY;
+        samples.lights(level, offsets, &mut lights);
+        assert_eq!((lights.light, lights.choice), (found.light, found.choice), "{level:?}");
         let mut found = [[0.0; 8]; 16];
         camera.compute(level, &mut found);
         check_records("camera ray", 0xffff, &found, &camera.reference());

@@ -7,7 +7,7 @@ use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
-use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers, pair, place_key, single};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::{Row, Row3, at};
@@ -24,6 +24,7 @@ pub(super) const KERNELS: &[Kernel] = &[
     Kernel { name: "camera rays", run: |blocks, i, level| blocks.0[i].camera(level) },
     Kernel { name: "surface points", run: |blocks, i, level| blocks.0[i].surface(level) },
     Kernel { name: "numbers of a vertex", run: |blocks, i, level| blocks.0[i].numbers(level) },
+    Kernel { name: "numbers of a light sample", run: |blocks, i, level| blocks.0[i].light_numbers(level) },
     Kernel { name: "near rectangle lights", run: |blocks, i, level| blocks.0[i].light(level) },
     Kernel { name: "light on diffuse", run: |blocks, i, level| blocks.0[i].direct(DIFFUSE, level) },
     Kernel { name: "light on rough metal", run: |blocks, i, level| blocks.0[i].direct(METAL, level) },
@@ -163,6 +164,24 @@ impl Block {
         match level {
             None => numbers = samples.reference(OFFSETS, true),
             Some(level) => samples.vertices(level, OFFSETS, true, &mut numbers),
+        }
+        black_box(&numbers);
+    }
+
+    fn light_numbers(&self, level: Option<Level>) {
+        let samples = &self.samples;
+        let mut numbers = VertexNumbers::EMPTY;
+        match level {
+            None => {
+                for i in 0..16 {
+                    let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
+                    let index = samples.index[i].reverse_bits();
+                    let [x, y] = pair(key, index, first + OFFSETS.light);
+                    (numbers.light[0][i], numbers.light[1][i]) = (x, y);
+                    numbers.choice[i] = single(key, index, first + OFFSETS.choice);
+                }
+            }
+            Some(level) => samples.lights(level, OFFSETS, &mut numbers),
         }
         black_box(&numbers);
     }
