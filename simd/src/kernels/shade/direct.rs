@@ -1,5 +1,5 @@
-//! Next-event estimation at the vertices of a block (Veach 1997, chapter 9): shadow rays of light samples with
-//! their contributions, weighted against BSDF sampling.
+//! Next-event estimation at the vertices of a block (Veach 1997, chapter 9): shadow rays of light samples
+//! with their contributions, weighted against BSDF sampling.
 //!
 //! Values of BSDFs without lanes come from the caller.
 
@@ -109,8 +109,8 @@ struct ShadowLanes<L: Lanes> {
     exists: L::Mask,
 }
 
-/// Weights light samples against BSDF sampling; given are f |cos| and density of other surfaces, and the share
-/// of each sample.
+/// Weights light samples against BSDF sampling; given are f |cos| and density of other surfaces, and the
+/// share of each sample.
 #[inline(always)]
 fn direct<L: Lanes>(
     vertex: &VertexLanes<L>,
