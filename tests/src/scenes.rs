@@ -186,15 +186,49 @@ pub fn cornell_box() -> SceneBuffers {
 /// The Cornell box with a floor of metal, alpha 0.3, and a tall block of plastic, alpha 0.4, seen from above:
 /// records do not serve the lobes of grazing viewers.
 pub fn rough_box() -> SceneBuffers {
+    box_from_above(metal(0.3f32.sqrt()), varnish(0.4f32.sqrt()))
+}
+
+/// The Cornell box with a floor of `floor` and a tall block of `block`, seen from above.
+pub fn box_from_above(floor: Surface, block: Surface) -> SceneBuffers {
     let mut buffers = cornell_box();
     let (eye, target) = (Vec3::new(0.5, 0.9, 0.03), Vec3::new(0.5, 0.1, 0.6));
     buffers.camera = Camera::look_at(eye, target, Vec3::Y, 75.0);
-    let of = |surface| Material { surface, ..Material::GREY };
-    let metal = buffers.material(of(metal(0.3f32.sqrt())));
-    let plastic = buffers.material(of(varnish(0.4f32.sqrt())));
-    let block = buffers.triangles.len() - 10;
-    buffers.triangles[..2].iter_mut().for_each(|triangle| triangle.material = metal);
-    buffers.triangles[block..].iter_mut().for_each(|triangle| triangle.material = plastic);
+    let [floor, block] =
+        [floor, block].map(|surface| buffers.material(Material { surface, ..Material::GREY }));
+    let first = buffers.triangles.len() - 10;
+    buffers.triangles[..2].iter_mut().for_each(|triangle| triangle.material = floor);
+    buffers.triangles[first..].iter_mut().for_each(|triangle| triangle.material = block);
+    buffers
+}
+
+/// A dim room with a floor of `floor`, on which the thin legs of a table stand in the sun of a spot light.
+pub fn table_in_the_sun(floor: Surface) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.5, 0.7, 0.02), Vec3::new(0.5, 0.0, 0.55), Vec3::Y, 60.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.5)));
+    let floor = buffers.material(Material { surface: floor, ..Material::GREY });
+    let wood = buffers.material(Material::diffuse(Rgb::new(0.7, 0.5, 0.3)));
+    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    let corners = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
+    buffers.quad(corners.map(|[x, z]| Vec3::new(x, 0.001, z)), floor);
+    for (x, z) in [(0.3, 0.4), (0.7, 0.4), (0.3, 0.75), (0.7, 0.75)] {
+        let low = Vec3::new(x - 0.02, 0.001, z - 0.02);
+        buffers.cuboid(low, low + Vec3::new(0.04, 0.25, 0.04), false, wood);
+    }
+    buffers.cuboid(Vec3::new(0.26, 0.251, 0.36), Vec3::new(0.74, 0.27, 0.79), false, wood);
+    let position = Vec3::new(0.02, 0.5, 0.3);
+    let direction = (Vec3::new(0.3, 0.1, 0.5) - position).normalize();
+    let (cos_inner, cos_outer) = (0.98, 0.95);
+    buffers.lights.push(PointLight::Spot {
+        position,
+        direction,
+        intensity: Rgb::splat(1.0),
+        cos_inner,
+        cos_outer,
+    });
+    let lamp = buffers.material(emitter(0.0, 1.0));
+    buffers.square(Vec3::new(0.5, 0.97, 0.5), Vec3::NEG_Y, 0.3, lamp);
     buffers
 }
 

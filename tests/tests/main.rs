@@ -43,3 +43,4 @@ mod stops;
 mod table;
 mod transport;
 mod transport_analytic;
+mod view_records;

@@ -1,7 +1,7 @@
 //! Rough reflection of a BSDF as the lobe that a radiance cache serves.
 
-use super::Bsdf;
 use super::coated::Coat;
+use super::{Bsdf, fresnel};
 use crate::Rgb;
 use core::f32::consts::FRAC_1_PI;
 
@@ -52,6 +52,27 @@ impl Bsdf {
         match self {
             Bsdf::Glossy(_) | Bsdf::Plastic(_) => self.base() * self.transmittance_at(cos) * FRAC_1_PI,
             _ => Rgb::ZERO,
+        }
+    }
+
+    /// GGX alpha of the rough reflection of a metal or of a coat. `None` for smooth and transmitting surfaces.
+    pub(crate) fn reflection_alpha(&self) -> Option<f32> {
+        let alpha = match self {
+            Bsdf::Conductor(b) => b.alpha,
+            Bsdf::Glossy(b) => b.alpha(),
+            Bsdf::Plastic(b) => b.alpha(),
+            _ => return None,
+        };
+        (alpha > 0.0).then_some(alpha)
+    }
+
+    /// Reflectance of a microfacet of a metal or a coat at the cosine `c`; 1 for other surfaces.
+    pub(crate) fn facet_reflectance(&self, c: f32) -> Rgb {
+        match self {
+            Bsdf::Conductor(b) => fresnel::schlick(b.f0, c),
+            Bsdf::Glossy(b) => b.reflectance(c),
+            Bsdf::Plastic(b) => b.reflectance(c),
+            _ => Rgb::ONE,
         }
     }
 }

@@ -109,7 +109,7 @@ impl<'a> Hemisphere<'a> {
 
 /// Sum of the squared second differences of luminance along rows of `side` values, and their number. For
 /// independent values their mean is six times the variance of a value.
-fn second_differences(values: &[[f32; 3]], side: usize) -> [f32; 2] {
+pub(super) fn second_differences(values: &[[f32; 3]], side: usize) -> [f32; 2] {
     let (mut squares, mut count) = (0.0, 0usize);
     for row in values.chunks_exact(side.max(1)) {
         let mut sum = 0.0;

@@ -5,3 +5,4 @@ mod hessian;
 pub mod irradiance;
 mod octree;
 pub mod radiance;
+pub mod view;

@@ -7,13 +7,16 @@
 
 use super::executor::{Executor, Passed};
 use super::record_placement::{CacheBuilder, LobeGathering, RecordPlacement, step_footprint, step_points};
+use super::view_placement::{self, ViewBuilder, ViewPlacement};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
 use crate::cache::radiance::{LobeSettings, PooledRecord, ServedLobes};
+use crate::cache::view::ViewRecords;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::scene::Scene;
 use crate::transport::cached::gather::GatherPoint;
+use crate::transport::cached::view::{self, ViewPoint};
 use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 
 /// Pixels for each record of a cache without a limit of memory.
@@ -28,6 +31,13 @@ pub const LEAST_PIXELS: f32 = 2.0;
 /// The fraction of the time that is left before both caches are filled in which each is to be filled: both
 /// are cut alike. Points that no record reaches by then are path traced.
 const TIME: f32 = 0.25;
+
+/// The same for the view-bound records of both halves, of the time that is left then.
+const VIEW_TIME: f32 = 0.15;
+
+/// Pixels for each view-bound record, and the fewest records.
+const PIXELS_PER_VIEW_RECORD: usize = 16;
+const FEWEST_VIEW_RECORDS: usize = 1024;
 
 /// Strata along a side behind rough surfaces are half as many, in multiples of this.
 const BLOCK: usize = 8;
@@ -84,6 +94,9 @@ impl CacheSettings {
     }
 }
 
+/// Structures that [`IrradianceCaching::fill`] fills: two caches, and view-bound records beside each.
+pub const FILLED: usize = 4;
+
 /// Irradiance caching of one picture.
 pub struct IrradianceCaching<'a, F> {
     integrator: PathIntegrator<'a, F>,
@@ -94,9 +107,43 @@ pub struct IrradianceCaching<'a, F> {
     builders: [CacheBuilder<'a>; 2],
     step: &'a mut [GatherPoint],
     lobes: Option<LobeGathering<'a>>,
+    views: Option<Views<'a>>,
     widens: bool,
     is_frozen: bool,
     is_cut: bool,
+}
+
+/// View-bound records of the even and of the odd samples, and the points of a step of their placement.
+struct Views<'a> {
+    builders: [ViewBuilder<'a>; 2],
+    step: &'a mut [ViewPoint],
+    is_cut: bool,
+}
+
+impl<'a> Views<'a> {
+    fn footprint(capacity: usize) -> Footprint {
+        let builder = ViewBuilder::footprint(capacity);
+        builder.and(builder).and(view_placement::step_footprint())
+    }
+
+    /// Records for the narrow lobes of `context`, if it has any and there is memory beside `reserve` bytes.
+    fn new(
+        context: &RenderContext<'a>,
+        reserve: usize,
+        memory: &mut impl MemorySource<'a>,
+    ) -> Result<Option<Self>, OutOfMemory> {
+        let capacity = (context.pixels() / PIXELS_PER_VIEW_RECORD).max(FEWEST_VIEW_RECORDS);
+        let footprint = Self::footprint(capacity);
+        let needed = footprint.bytes().saturating_add(reserve);
+        if !view::may_serve(context.scene) || memory.available() < needed {
+            return Ok(None);
+        }
+        let mut arena = memory.take("view-bound records", footprint)?;
+        let bounds = context.bvh.bounds();
+        let mut builder = |index| ViewBuilder::new(&bounds, capacity, index, &mut arena);
+        let builders = [builder(0)?, builder(1)?];
+        Ok(Some(Self { builders, step: view_placement::step_points(&mut arena)?, is_cut: false }))
+    }
 }
 
 impl<'a, F: Features> IrradianceCaching<'a, F> {
@@ -105,6 +152,10 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         let gathering = PathIntegrator::<F>::gather_scratch_with::<((), CausticMerging)>(
             settings.strata.max(settings.lobe_strata()),
         );
+        let gathering = match settings.lobes {
+            Some(_) if F::GLOSSY => gathering.or(PathIntegrator::<F>::view_scratch::<((), CausticMerging)>()),
+            _ => gathering,
+        };
         PathIntegrator::<F>::scratch_with::<((), CausticMerging), ()>(WAVE).or(gathering)
     }
 
@@ -134,6 +185,13 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         let served = lobes.as_ref().map(|gathering| *gathering.lobes());
         let degree = served.as_ref().map(ServedLobes::degree);
 
+        let views = match settings.lobes {
+            Some(_) if F::GLOSSY => {
+                let records = CacheBuilder::footprint(settings.fewest, degree).bytes().saturating_mul(2);
+                Views::new(context, settings.reserve.saturating_add(records), memory)?
+            }
+            _ => None,
+        };
         let available = memory.available().saturating_sub(settings.reserve);
         let wanted = (context.pixels() / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
         let wanted = wanted.saturating_add(settings.fewest);
@@ -153,6 +211,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             builders,
             step,
             lobes,
+            views,
             widens: settings.widens,
             is_frozen: false,
             is_cut: false,
@@ -160,6 +219,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         // No surface reflects light onto the one that is seen.
         if context.settings.max_depth <= 2 {
             method.finish();
+            method.views = None;
         }
         Ok(method)
     }
@@ -214,18 +274,35 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         &self.integrator
     }
 
+    /// View-bound records of even and of odd samples, if the scene has narrow lobes.
+    pub fn views(&self) -> Option<[&ViewRecords<'a>; 2]> {
+        self.views.as_ref().map(|views| views.builders.each_ref().map(|builder| &builder.records))
+    }
+
+    /// True if there was no time for all view-bound records.
+    pub fn is_view_cut(&self) -> bool {
+        self.views.as_ref().is_some_and(|views| views.is_cut)
+    }
+
     /// Paths of the picture.
     pub fn cached_paths(&self) -> PathIntegrator<'_, F, CacheView<'_>> {
-        self.integrator.with_caches(self.caches())
+        match self.views() {
+            Some(views) => self.integrator.with_views(self.caches(), views),
+            None => self.integrator.with_caches(self.caches()),
+        }
     }
 
-    /// True if cache `number` is as it will be.
+    /// True if structure `number` is as it will be: see [`IrradianceCaching::fill`].
     pub fn is_filled(&self, number: usize) -> bool {
-        self.builders.get(number).is_none_or(CacheBuilder::is_finished)
+        match self.builders.get(number) {
+            Some(builder) => builder.is_finished(),
+            None => self.views.as_ref().is_none_or(|views| views.builders[number % 2].is_finished()),
+        }
     }
 
-    /// Fills cache `number`, 0 or 1, or goes on with it. Gather rays end in `photons`, which paths of limited
-    /// depth must not ask for. Returns whether that is done.
+    /// Fills structure `number` of [`FILLED`], or goes on with it: the caches of even and of odd samples, and
+    /// the view-bound records of both. Gather rays end in `photons`, which paths of limited depth must not
+    /// ask for. Returns whether that is done.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is too small.
@@ -235,7 +312,9 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         photons: Option<CausticMerging>,
         round: &mut Round<E>,
     ) -> Result<bool, OutOfMemory> {
-        let Some(builder) = self.builders.get_mut(number) else { return Ok(true) };
+        let Some(builder) = self.builders.get_mut(number) else {
+            return self.fill_views(number % 2, photons, round);
+        };
         let mut placement = RecordPlacement {
             integrator: &self.integrator,
             photons,
@@ -263,9 +342,48 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         Ok(true)
     }
 
-    /// Ends the filling of both caches.
+    /// Fills the view-bound records of half `number`, after both caches.
+    fn fill_views<E: Executor>(
+        &mut self,
+        number: usize,
+        photons: Option<CausticMerging>,
+        round: &mut Round<E>,
+    ) -> Result<bool, OutOfMemory> {
+        let Some(views) = &mut self.views else { return Ok(true) };
+        let builder = &mut views.builders[number];
+        if builder.is_finished() {
+            return Ok(true);
+        }
+        let irradiance = &mut self.builders[number].cache;
+        irradiance.rebuild();
+        let mut placement = ViewPlacement {
+            integrator: &self.integrator,
+            irradiance,
+            photons,
+            metric: self.metric,
+            least_pixels: LEAST_PIXELS,
+            size: self.size,
+            step: &mut *views.step,
+        };
+        let Round { executor, state, .. } = round;
+        let Passed { counters, is_complete } = executor.timed("cache", |executor| {
+            let fraction = VIEW_TIME / (1.0 - VIEW_TIME * number as f32);
+            executor.within(fraction, |executor| placement.fill(builder, executor))
+        })?;
+        state.counters += counters;
+        if is_complete || executor.is_over() {
+            return Ok(is_complete);
+        }
+        builder.finish();
+        views.is_cut = true;
+        Ok(true)
+    }
+
+    /// Ends the filling of all structures.
     pub fn freeze(&mut self) {
         self.builders.iter_mut().for_each(|builder| builder.cache.rebuild());
+        let views = self.views.iter_mut().flat_map(|views| &mut views.builders);
+        views.for_each(|builder| builder.records.rebuild());
         self.is_frozen = true;
     }
 }
@@ -273,8 +391,10 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
 impl<F: Features> Method for IrradianceCaching<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         if !self.is_frozen {
-            if !(self.fill(0, None, round)? && self.fill(1, None, round)?) {
-                return Ok(());
+            for number in 0..FILLED {
+                if !self.fill(number, None, round)? {
+                    return Ok(());
+                }
             }
             self.freeze();
         }

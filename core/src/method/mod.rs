@@ -26,6 +26,7 @@ pub mod record_placement;
 pub mod round;
 mod splats;
 pub mod sppm;
+pub mod view_placement;
 
 /// Rays per second and thread by which a time limit becomes work. No clock is read.
 pub const RAYS_PER_SECOND: f64 = 6e6;

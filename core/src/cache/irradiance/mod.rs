@@ -18,6 +18,7 @@ pub use super::octree::POINTS;
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use lanes::QueryPoint;
 pub use metric::Metric;
+pub(in crate::cache) use neighbours::GRADIENT_VARIANCE;
 pub use packet::Points;
 pub use record::{OVERHANG_DISTANCE_FACTOR, OVERHANG_RADIUS_FACTOR, Record, SECTORS};
 pub(crate) use reflected::Viewer;

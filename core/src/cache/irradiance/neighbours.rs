@@ -15,7 +15,7 @@ const MIN_NORMAL_COSINE: f32 = 0.5;
 const NOISE_DEVIATIONS: f32 = 3.0;
 
 /// Variance of a gradient over the product of the irradiance's variance and the mean of 1/t².
-const GRADIENT_VARIANCE: f32 = 16.0;
+pub(in crate::cache) const GRADIENT_VARIANCE: f32 = 16.0;
 
 /// Maximum number of neighbours to which a new record is compared.
 const MAX_COMPARED: usize = 32;

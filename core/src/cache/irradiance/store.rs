@@ -186,6 +186,38 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
+    /// Calls `visit` with each record that is valid at a point, its number, the value that it extrapolates and
+    /// its weight.
+    pub(in crate::cache) fn visit_extrapolated(
+        &self,
+        point: &QueryPoint,
+        mut visit: impl FnMut(u32, &Record, (Rgb, f32)),
+    ) {
+        self.tree.at(point.position, |index| {
+            if let Some(record) = self.records.get(index as usize)
+                && let Some(extrapolated) = record.at(point, self.least_cos)
+            {
+                visit(index, record, extrapolated);
+            }
+            true
+        });
+    }
+
+    /// True if a record covers the point for which `is_asked` holds, whatever hangs over the point.
+    pub(in crate::cache) fn covers_by(
+        &self,
+        point: &QueryPoint,
+        is_asked: impl Fn(u32, &Record) -> bool,
+    ) -> bool {
+        let mut covered = false;
+        self.tree.at(point.position, |index| {
+            let record = self.records.get(index as usize).filter(|record| is_asked(index, record));
+            covered = record.is_some_and(|record| record.covers(point, self.least_cos));
+            !covered
+        });
+        covered
+    }
+
     /// True if a record covers the point. If the height of overhangs above the point is unknown (`within` is
     /// infinite), the record must be valid for any height.
     #[inline]

@@ -9,8 +9,13 @@ use crate::transport::cached::placement::Via;
 
 /// Records shrink when their neighbours clamp them, so sweeps are repeated, at most this many times, or until
 /// a sweep adds less than one record in [`FEW`]. Behind rough surfaces each sweep sees other points.
-const SWEEPS: u32 = 4;
+pub(in crate::method) const SWEEPS_MAX: u32 = 4;
 const FEW: usize = 50;
+
+/// True if the sweep that began with `before` records and ended with `records` was of little use.
+pub(in crate::method) fn adds_few(before: usize, records: usize) -> bool {
+    (records - before.min(records)) * FEW < records
+}
 
 /// The first gather rays end in no record, so they are long. After the first sweep the records that took more
 /// rays than this for each path, over the median, are gathered again.
@@ -135,9 +140,9 @@ impl<'m> CacheBuilder<'m> {
             self.forget_long();
         }
         let records = self.cache.records().len();
-        let adds_few = (records - self.before.min(records)) * FEW < records;
+        let adds_few = adds_few(self.before, records);
         self.before = records;
-        if !is_first && adds_few || self.sweeps == SWEEPS {
+        if !is_first && adds_few || self.sweeps == SWEEPS_MAX {
             let is_next = has_rough && self.via == Some(Via::Specular);
             (self.via, self.sweeps) = (is_next.then_some(Via::Glossy), 0);
         }

@@ -6,7 +6,7 @@
 //! repeated: first for diffuse points that are seen directly or through mirrors and glass, then for those
 //! behind rough surfaces.
 
-mod builder;
+pub(super) mod builder;
 
 pub use builder::CacheBuilder;
 
@@ -27,7 +27,7 @@ const STEP: usize = 16 * PIXELS;
 
 /// Gather points between two commits: a part of the records, within these limits. The first records soon
 /// serve others.
-const FEWEST_POINTS: usize = 8;
+pub(super) const POINTS_PER_COMMIT: PointsPerCommit = PointsPerCommit { fewest: 8, most: MOST_POINTS };
 const MOST_POINTS: usize = 32;
 const POINTS_PER_RECORD: usize = 4;
 
@@ -35,6 +35,19 @@ const POINTS_PER_RECORD: usize = 4;
 /// of what such records could serve.
 const WIDEST: f32 = 6.0;
 const NEARLY_ALL: f64 = 0.98;
+
+/// Limits of the points between two commits.
+pub(super) struct PointsPerCommit {
+    fewest: usize,
+    pub(super) most: usize,
+}
+
+impl PointsPerCommit {
+    /// Points to gather at after `records` records.
+    pub(super) fn of(&self, records: usize) -> usize {
+        (records / POINTS_PER_RECORD).clamp(self.fewest, self.most)
+    }
+}
 
 /// Bytes of [`step_points`].
 pub fn step_footprint() -> Footprint {
@@ -138,8 +151,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
             while first < end {
                 let missing = self.step.get_mut(first..end).unwrap_or_default();
                 end = first + retain(missing, |point| !builder.is_served(point, least_pixels));
-                let most = builder.cache.records().len() / POINTS_PER_RECORD;
-                let next = end.min(first + most.clamp(FEWEST_POINTS, MOST_POINTS));
+                let next = end.min(first + POINTS_PER_COMMIT.of(builder.cache.records().len()));
                 if !self.gather(first..next, builder, executor, &mut counters)? {
                     return Ok(Passed { counters, is_complete: false });
                 }
@@ -306,7 +318,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
 }
 
 /// Moves the values that are to be kept to the front, in their order, and returns their number.
-fn retain<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
+pub(super) fn retain<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
     let mut kept = 0;
     for i in 0..values.len() {
         if is_kept(&values[i]) {

@@ -164,13 +164,13 @@ pub(in crate::transport) struct HemisphereSamples<'m> {
 }
 
 impl<'m> HemisphereSamples<'m> {
-    fn footprint(n: usize) -> Footprint {
+    pub(super) fn footprint(n: usize) -> Footprint {
         let strata = n.saturating_mul(n);
         let triples = Footprint::default().slice::<[f32; 3]>(strata);
         triples.and(triples).and(triples).slice::<f32>(strata)
     }
 
-    fn new(n: usize, normals: bool, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub(super) fn new(n: usize, normals: bool, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let strata = n.saturating_mul(n);
         Ok(Self {
             n,
@@ -236,32 +236,10 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
         let mut arena = scratch.scratch();
-        let mut wave = PathWave::<E::State, ()>::new((n * n).min(WAVE), &mut arena)?;
         let mut strata = HemisphereSamples::new(n, metric.metric.takes_normals(), &mut arena)?;
         let frame = Frame::from_normal(place.normal());
-        let mut first = 0;
-        while first < n * n {
-            let count = (n * n - first).min(wave.wave.paths.len());
-            for i in 0..count {
-                let (ray, path) = self.generate_gather_ray(place, &frame, number, first + i, &mut strata);
-                wave.wave.rays[i] = Ray { tag: i as u32, ..ray };
-                wave.wave.paths[i] = path;
-                wave.begin(i, 0);
-            }
-            counters.paths += count as u64;
-            let coherence = if n >= NARROW { Coherence::Coherent } else { Coherence::Incoherent };
-            wave.wave.trace(&self.context, count, coherence, counters);
-            for (path, hit) in wave.wave.paths.iter().zip(&*wave.wave.hits).take(count) {
-                self.store_hit(path.place as usize, hit, &frame, &mut strata);
-            }
-            self.trace_to_end(&mut wave, count, counters);
-            for path in wave.wave.paths.iter().take(count) {
-                if let Some(slot) = strata.radiance.get_mut(path.place as usize) {
-                    *slot = path.radiance;
-                }
-            }
-            first += count;
-        }
+        let generate = |i| self.generate_gather_ray(place, &frame, (number, i), n);
+        self.trace_strata(&frame, &mut strata, &mut arena, generate, counters)?;
         let variance = strata.hemisphere().map_or(0.0, |hemisphere| hemisphere.variance());
         let derivatives =
             strata.hemisphere().and_then(|h| metric.metric.derivatives(self.context.level, flux, &h));
@@ -285,6 +263,47 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         Ok(Some((record, pooled.unwrap_or_default())))
     }
 
+    /// Traces the rays of all strata, and stores their light and their hits. `generate` returns the local
+    /// direction of ray i, the ray, and its path, whose place is the stratum.
+    pub(in crate::transport) fn trace_strata(
+        &self,
+        frame: &Frame,
+        strata: &mut HemisphereSamples,
+        arena: &mut Arena,
+        generate: impl Fn(usize) -> (Vec3, Ray, PathState),
+        counters: &mut Counters,
+    ) -> Result<(), OutOfMemory> {
+        let n = strata.n;
+        let mut wave = PathWave::<E::State, ()>::new((n * n).min(WAVE), arena)?;
+        let mut first = 0;
+        while first < n * n {
+            let count = (n * n - first).min(wave.wave.paths.len());
+            for i in 0..count {
+                let (direction, ray, path) = generate(first + i);
+                if let Some(slot) = strata.directions.get_mut(path.place as usize) {
+                    *slot = direction.to_array();
+                }
+                wave.wave.rays[i] = Ray { tag: i as u32, ..ray };
+                wave.wave.paths[i] = path;
+                wave.begin(i, 0);
+            }
+            counters.paths += count as u64;
+            let coherence = if n >= NARROW { Coherence::Coherent } else { Coherence::Incoherent };
+            wave.wave.trace(&self.context, count, coherence, counters);
+            for (path, hit) in wave.wave.paths.iter().zip(&*wave.wave.hits).take(count) {
+                self.store_hit(path.place as usize, hit, frame, strata);
+            }
+            self.trace_to_end(&mut wave, count, counters);
+            for path in wave.wave.paths.iter().take(count) {
+                if let Some(slot) = strata.radiance.get_mut(path.place as usize) {
+                    *slot = path.radiance;
+                }
+            }
+            first += count;
+        }
+        Ok(())
+    }
+
     /// Projects the light of `hemisphere` and writes its coefficients and their gradients, times
     /// `gradient_scale`, to `out`.
     fn write_coefficients(
@@ -303,26 +322,21 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         write(out, &coefficients, &gradients, record.radii[0])
     }
 
-    /// Ray `i` of a gather, and its path.
+    /// Local direction of ray `i` of gather `number` with n × n strata, the ray, and its path.
     fn generate_gather_ray(
         &self,
         place: &GatherPoint,
         frame: &Frame,
-        number: u32,
-        i: usize,
-        strata: &mut HemisphereSamples,
-    ) -> (Ray, PathState) {
-        let n = strata.n;
+        (number, i): (u32, usize),
+        n: usize,
+    ) -> (Vec3, Ray, PathState) {
         let stratum = stratum(n, i);
         let (pixel, sample) = (NO_PIXEL | number, i as u32);
         let [u, v] = Sampler::new(self.settings.seed, pixel, sample).pair(dimension::PIXEL);
         let (row, column) = (stratum / n, stratum % n);
         let direction = cosine_hemisphere([(column as f32 + u) / n as f32, (row as f32 + v) / n as f32]);
-        if let Some(slot) = strata.directions.get_mut(stratum) {
-            *slot = direction.to_array();
-        }
         let ray = place.ray(frame.to_world(direction));
-        (ray, place.path(pixel, sample, stratum))
+        (direction, ray, place.path(pixel, sample, stratum))
     }
 
     /// Stores distance, emission and normal of the hit of a stratum.

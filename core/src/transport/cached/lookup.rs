@@ -5,8 +5,9 @@ use crate::bsdf::{Bsdf, Features};
 use crate::cache::irradiance::Viewer;
 use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS, Points, QueryPoint};
 use crate::cache::radiance::{RecordCoefficients, ServedLobes};
+use crate::cache::view::ViewRecords;
 use crate::scene::SurfacePoint;
-use crate::transport::cached::overhang;
+use crate::transport::cached::{overhang, view};
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{KnownLight, LightEstimator, PathVertex, RemainingLight};
 use crate::transport::settings::{Counters, PathSettings};
@@ -38,6 +39,8 @@ pub struct CachedLight {
     irradiance: Option<CachedIrradiance>,
     /// Radiance that the lobe of the surface reflects, if a valid record serves it.
     lobe: Option<Rgb>,
+    /// The same of a narrow lobe that the camera sees, by view-bound records.
+    view: Option<Rgb>,
 }
 
 /// Irradiance caches that paths look up.
@@ -45,6 +48,8 @@ pub struct CachedLight {
 pub enum CacheView<'a> {
     /// Frozen caches of even and of odd samples.
     Pair([&'a IrradianceCache<'a>; 2]),
+    /// The same, with view-bound records of even and of odd samples.
+    WithViews([&'a IrradianceCache<'a>; 2], [&'a ViewRecords<'a>; 2]),
     /// A cache that is valid at every point and returns zero: paths then find the light that no cache
     /// supplies.
     Everywhere,
@@ -57,9 +62,9 @@ impl CacheView<'_> {
     /// Lobes that the records serve.
     fn lobes(&self) -> Option<&ServedLobes<'_>> {
         match self {
-            CacheView::Pair([cache, _]) | CacheView::UnderConstruction(cache) => {
-                cache.coefficients().map(RecordCoefficients::lobes)
-            }
+            CacheView::Pair([cache, _])
+            | CacheView::WithViews([cache, _], _)
+            | CacheView::UnderConstruction(cache) => cache.coefficients().map(RecordCoefficients::lobes),
             CacheView::Everywhere => None,
         }
     }
@@ -78,7 +83,7 @@ impl CacheView<'_> {
         let lobe = &lobes.find(&context.bsdf_at(point), cos)?;
         let viewer = Viewer { lobe, direction: viewer };
         match self {
-            CacheView::Pair(caches) => {
+            CacheView::Pair(caches) | CacheView::WithViews(caches, _) => {
                 caches[sample as usize & 1].reflected(context.level, query, &viewer, false)
             }
             CacheView::UnderConstruction(cache) => cache.reflected(context.level, query, &viewer, true),
@@ -97,7 +102,7 @@ impl CacheView<'_> {
     ) {
         let queries = queries.iter().enumerate().filter_map(|(i, query)| Some((i, query.as_ref()?)));
         match self {
-            CacheView::Pair(caches) => {
+            CacheView::Pair(caches) | CacheView::WithViews(caches, _) => {
                 let mut points = [Points::NONE; 2];
                 queries.for_each(|(i, (query, sample))| points[*sample as usize & 1].set(i, query));
                 for (cache, points) in caches.iter().zip(&points) {
@@ -149,14 +154,17 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {
         match self {
             // With cut-outs each path has memory for one shadow ray.
-            CacheView::Pair(_) | CacheView::Everywhere if !context.has_cutouts => LIGHT_SAMPLES,
+            CacheView::Pair(_) | CacheView::WithViews(..) | CacheView::Everywhere if !context.has_cutouts => {
+                LIGHT_SAMPLES
+            }
             _ => 1,
         }
     }
 
     #[inline]
     fn separates_coat(&self, _: &SceneContext<F>, bsdf: &Bsdf, found: &Self::Found) -> bool {
-        found.irradiance.is_some() && found.lobe.is_none() && bsdf.has_coated_base()
+        let has_lobe = found.lobe.or(found.view).is_some();
+        found.irradiance.is_some() && !has_lobe && bsdf.has_coated_base()
     }
 
     fn look_up(
@@ -201,6 +209,15 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
                 }
             }
         }
+        if F::GLOSSY
+            && let CacheView::WithViews(_, views) = self
+        {
+            for ((found, point), i) in found.iter_mut().zip(points).zip(range) {
+                if let Some(point) = point.as_ref().filter(|_| found.lobe.is_none()) {
+                    found.view = view::reflected((context, settings), views, (wave, i), point);
+                }
+            }
+        }
     }
 
     #[inline]
@@ -213,21 +230,27 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         add: &mut impl FnMut(KnownLight),
     ) -> RemainingLight {
         let PathVertex { throughput, ref bsdf, wo, apart, .. } = *vertex;
-        let Some(indirect) = found.irradiance else { return RemainingLight::all(vertex) };
+        let has_base = F::GLOSSY && bsdf.has_coated_base();
         if F::GLOSSY
-            && let Some(lobe) = found.lobe
+            && let Some(lobe) = found.lobe.or(found.view)
+            && (found.irradiance.is_some() || !has_base)
         {
-            let base = match bsdf.has_coated_base() {
-                true => bsdf.base_radiance::<F>(wo, indirect.irradiance, indirect.edge_moment),
-                false => Rgb::ZERO,
+            let base = match found.irradiance {
+                Some(CachedIrradiance { irradiance, edge_moment, .. }) if has_base => {
+                    bsdf.base_radiance::<F>(wo, irradiance, edge_moment)
+                }
+                _ => Rgb::ZERO,
             };
             add(KnownLight { contribution: throughput * (lobe + base), blur: Rgb::ZERO });
-            let light_samples = self.light_samples(context);
+            // One direction of a narrow lobe finds the lamps that it mirrors, light samples seldom.
+            let is_narrow = found.view.is_some() && !has_base;
+            let light_samples = if is_narrow { 1 } else { self.light_samples(context) };
             return RemainingLight { light_samples, ..RemainingLight::of(PathClasses::DIRECT) };
         }
+        let Some(indirect) = found.irradiance else { return RemainingLight::all(vertex) };
         let contribution = match bsdf {
             Bsdf::Diffuse(diffuse) => throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI,
-            _ if F::GLOSSY && bsdf.has_coated_base() => {
+            _ if has_base => {
                 throughput * bsdf.base_radiance::<F>(wo, indirect.irradiance, indirect.edge_moment)
             }
             _ => return RemainingLight::all(vertex),
@@ -255,6 +278,15 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     /// vertex of a path does, since records do not store their distance from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> PathIntegrator<'a, F, CacheView<'a>> {
         self.with_estimator(CacheView::Pair(caches))
+    }
+
+    /// [`PathIntegrator::with_caches`] with view-bound records of even and of odd samples.
+    pub fn with_views(
+        &self,
+        caches: [&'a IrradianceCache<'a>; 2],
+        views: [&'a ViewRecords<'a>; 2],
+    ) -> PathIntegrator<'a, F, CacheView<'a>> {
+        self.with_estimator(CacheView::WithViews(caches, views))
     }
 
     /// This path tracer without the light that a complete cache would supply.

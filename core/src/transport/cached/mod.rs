@@ -6,3 +6,4 @@ pub mod gather;
 pub(in crate::transport) mod lookup;
 pub(in crate::transport) mod overhang;
 pub mod placement;
+pub mod view;

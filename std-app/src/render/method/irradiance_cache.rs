@@ -23,12 +23,14 @@ use halflight_core::method::caustics::{
     self, CausticEmission, CausticPhotons, CausticSettings, CausticUse, Decision, Prepass, least_footprint,
     prepass,
 };
-use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
+use halflight_core::method::irradiance_cache::{CacheSettings, FILLED, IrradianceCaching};
 use halflight_core::method::path::PathTracing;
 use halflight_core::method::record_placement::CacheBuilder;
+use halflight_core::method::view_placement::RAYS;
 use halflight_core::method::{LastMaps, Method as _};
 use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::PathIntegrator;
+use halflight_core::transport::cached::view;
 
 /// Emission of caustic photons, if they pay and fit into memory besides the needs of `cache`.
 fn find_caustics<'m, F: Features>(
@@ -154,12 +156,12 @@ impl<'m, F: Features> Cached<'m, F> {
     fn fill(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
         let Self { method, photons: maps, scratch, .. } = self;
         let mut all = true;
-        for number in 0..2 {
+        for number in 0..FILLED {
             // With a limited depth gather rays use no photons.
             let asks = !method.is_filled(number) && !method.paths().is_limited();
             let photons = match maps.as_mut().filter(|_| asks) {
                 Some(maps) => {
-                    match round.run(scratch, |round| maps.for_records::<F, _>(number as u32, round))? {
+                    match round.run(scratch, |round| maps.for_records::<F, _>(number as u32 % 2, round))? {
                         Some(photons) => Some(photons),
                         None => {
                             all = false;
@@ -223,7 +225,7 @@ impl<'m, F: Features> Cached<'m, F> {
             let rough = self.setup.scene.materials.iter().filter(may_be_rough).count() as u64;
             let reason = match rough {
                 0 => "no surface has a rough reflection",
-                _ => "the lobes are too narrow for records: they are path traced",
+                _ => "the lobes are too narrow for coefficients",
             };
             return Finding::new("radiance_records", LeftOut, reason)
                 .with_count("path_traced_materials", rough);
@@ -237,7 +239,7 @@ impl<'m, F: Features> Cached<'m, F> {
         let census = lobes.census();
         let reason = match census.left {
             0 => "the light of rough reflections is interpolated",
-            _ => "the light of wide lobes is interpolated: narrow ones are path traced",
+            _ => "the light of wide lobes is interpolated",
         };
         Finding::new("radiance_records", Used, reason)
             .with("basis", Value::Name("zernike"))
@@ -247,6 +249,27 @@ impl<'m, F: Features> Cached<'m, F> {
             .with("records", Value::Count(caches.iter().map(|cache| with_lobes(cache)).sum()))
             .with_count("served_materials", census.served)
             .with_count("path_traced_materials", census.left)
+    }
+
+    /// Finding on the narrow lobes that the camera sees.
+    fn view_finding(&self) -> Finding {
+        const TOPIC: &str = "view_bound_records";
+        let Some(views) = self.method.views() else {
+            let reason = match view::may_serve(self.setup.scene) {
+                true => "not enough memory, or too short paths: narrow lobes are path traced",
+                false => "no surface has a narrow lobe, of alpha 0.05 to 0.25",
+            };
+            return Finding::new(TOPIC, LeftOut, reason);
+        };
+        let records = views.iter().map(|records| records.records().len() as u64).sum::<u64>();
+        let (decision, reason) = match (records, self.method.is_view_cut()) {
+            (0, _) => (LeftOut, "the camera sees no narrow lobe on a flat surface"),
+            (_, true) => (Limited, "filling was cut short: other narrow lobes are path traced"),
+            (_, false) => (Used, "light that narrow lobes reflect to the camera is interpolated"),
+        };
+        Finding::new(TOPIC, decision, reason)
+            .with("rays_per_record", Value::Count(RAYS as u64))
+            .with("records", Value::Count(records))
     }
 
     /// Writes the file during the render, or at the end if a write is outstanding.
@@ -325,8 +348,10 @@ impl<F: Features> Renderer for Cached<'_, F> {
 
     fn findings(&self) -> Findings {
         let photons = self.photons.as_ref().map(|photons| photons.statistics());
-        let lobes = (self.chosen == Method::RadianceCache).then(|| self.lobe_finding());
-        Findings::from(self.finding()).and(lobes).and(self.caustics.findings(photons))
+        let is_radiance = self.chosen == Method::RadianceCache;
+        let lobes = is_radiance.then(|| self.lobe_finding());
+        let views = is_radiance.then(|| self.view_finding());
+        Findings::from(self.finding()).and(lobes).and(views).and(self.caustics.findings(photons))
     }
 }
 

@@ -1,0 +1,120 @@
+use super::lobe::ReflectedRadiance;
+use super::*;
+use crate::Rgb;
+use crate::bsdf::{Bsdf, Conductor};
+use crate::sampling::Random;
+use glam::{Vec2, Vec3};
+use std::vec::Vec;
+
+fn metal(alpha: f32) -> Bsdf {
+    Bsdf::Conductor(Conductor { f0: Rgb::new(0.9, 0.6, 0.3), alpha })
+}
+
+/// Reflected radiance at `place` of the plane z = 0, whose light along a ray from there is `light`: radiance
+/// and inverse distance. One sample in the middle of each of n × n strata, or one at random.
+fn reflected(
+    bsdf: &Bsdf,
+    (place, eye): (Vec3, Vec3),
+    (n, random): (usize, Option<u32>),
+    light: &dyn Fn(Vec3, Vec3) -> (f32, f32),
+) -> ReflectedRadiance {
+    let to_eye = eye - place;
+    let lobe = ViewedLobe::new(bsdf, to_eye.normalize(), to_eye.length()).unwrap();
+    let points: Vec<[f32; 2]> = (0..n * n)
+        .map(|stratum| {
+            let offset = |axis: u32| match random {
+                Some(seed) => Random::new(seed, stratum as u32).single(axis),
+                None => 0.5,
+            };
+            [((stratum / n) as f32 + offset(0)) / n as f32, ((stratum % n) as f32 + offset(1)) / n as f32]
+        })
+        .collect();
+    let seen: Vec<_> = points.iter().map(|&u| light(place, lobe.direction(u))).collect();
+    let radiance: Vec<_> = seen.iter().map(|(radiance, _)| [*radiance; 3]).collect();
+    let inverse_distance: Vec<_> = seen.iter().map(|(_, inverse)| *inverse).collect();
+    lobe.reflected(LobeSamples {
+        n,
+        points: &points,
+        radiance: &radiance,
+        inverse_distance: &inverse_distance,
+    })
+    .unwrap()
+}
+
+/// Radiance reflected at `place`, by 512 × 512 directions of the lobe.
+fn exact(bsdf: &Bsdf, place: Vec3, eye: Vec3, light: &dyn Fn(Vec3, Vec3) -> (f32, f32)) -> f64 {
+    const N: usize = 512;
+    let to_eye = eye - place;
+    let lobe = ViewedLobe::new(bsdf, to_eye.normalize(), to_eye.length()).unwrap();
+    let mut sum = 0.0;
+    for stratum in 0..N * N {
+        let u = [stratum / N, stratum % N].map(|k| (k as f32 + 0.5) / N as f32);
+        let direction = lobe.direction(u);
+        if direction.z > 0.0 {
+            let (radiance, _) = light(place, direction);
+            sum += f64::from(radiance * lobe.weight_of(direction).x);
+        }
+    }
+    sum / (N * N) as f64
+}
+
+fn difference(of: &dyn Fn(Vec3) -> f64, place: Vec3, step: f32) -> Vec2 {
+    let along = |axis: Vec3| (of(place + step * axis) - of(place - step * axis)) as f32 / (2.0 * step);
+    Vec2::new(along(Vec3::X), along(Vec3::Y))
+}
+
+const EYE: Vec3 = Vec3::new(-1.2, 0.2, 1.0);
+
+/// Light of one radiance everywhere is reflected by the albedo of the lobe, over the reflectance of the mirror
+/// direction, and has the gradient of that albedo.
+#[test]
+fn light_of_one_radiance_has_the_gradient_of_the_albedo() {
+    let light = |_: Vec3, _: Vec3| (1.0, 0.7);
+    for alpha in [0.05, 0.1, 0.2] {
+        let bsdf = metal(alpha);
+        for place in [Vec3::ZERO, Vec3::new(0.7, -0.3, 0.0), Vec3::new(2.0, 0.5, 0.0)] {
+            let found = reflected(&bsdf, (place, EYE), (32, None), &light).derivatives;
+            let albedo = |place: Vec3| exact(&bsdf, place, EYE, &light);
+            let wanted = albedo(place);
+            assert!((f64::from(found.irradiance.x) / wanted - 1.0).abs() < 5e-3, "{alpha} {place}");
+            let slope = difference(&albedo, place, 0.02);
+            // The albedo changes over about the height of the camera.
+            assert!(
+                found.gradient[0].distance(slope) < 0.01,
+                "{alpha} {place}: {} {slope}",
+                found.gradient[0]
+            );
+            assert_eq!(found.hessian.xx, 0.0);
+        }
+    }
+}
+
+/// A wall of squares of two radiances at x = 1 over a dark floor, in the mirror.
+fn checkered(place: Vec3, direction: Vec3) -> (f32, f32) {
+    let t = (1.0 - place.x) / direction.x;
+    if !(t > 0.0) {
+        return (0.2, 0.0);
+    }
+    let at = place + t * direction;
+    let square = |x: f32| libm::floorf(1.5 * x) as i32;
+    (if (square(at.y) + square(at.z)) % 2 == 0 { 1.0 } else { 0.25 }, 1.0 / t)
+}
+
+#[test]
+fn gradients_of_a_checkered_wall_are_those_of_brute_force() {
+    let mut worst = Vec::new();
+    for alpha in [0.1, 0.2] {
+        let bsdf = metal(alpha);
+        let (mut errors, mut size) = (0.0, 0.0);
+        for i in 0..12u32 {
+            let random = Random::new(9, i);
+            let place = Vec3::new(0.8 * random.single(0) - 0.4, random.single(1) - 0.5, 0.0);
+            let wanted = difference(&|place| exact(&bsdf, place, EYE, &checkered), place, 0.02);
+            let found = reflected(&bsdf, (place, EYE), (32, None), &checkered).derivatives.gradient[0];
+            errors += found.distance_squared(wanted);
+            size += wanted.length_squared();
+        }
+        worst.push(libm::sqrtf(errors / size));
+    }
+    assert!(worst.iter().all(|error| *error < 0.05), "{worst:?}");
+}

@@ -1,0 +1,80 @@
+//! View-bound records against path tracing: floors of narrow metal and of varnish, and a table in the sun, whose
+//! legs are small bright things close to the surface.
+
+use halflight::render::{Method, RenderResult, Settings};
+use halflight_core::findings::Decision;
+use halflight_tests::render::{blocks_of, finding, number, render};
+use halflight_tests::scenes::{SceneBuffers, box_from_above, cornell_box, metal, table_in_the_sun, varnish};
+use halflight_tests::statistics::agree_within;
+
+const SIZE: u32 = 48;
+
+/// Independent pictures of each method.
+const REPLICAS: u32 = 8;
+
+/// Largest bias of a block of 4 × 4 pixels, as a share of its light plus a tenth of the mean.
+const BIAS: f64 = 1.0 / 6.0;
+
+/// Largest relative bias of the picture's mean.
+const BIAS_OF_MEAN: f64 = 0.003;
+
+fn cached(buffers: &SceneBuffers, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(&buffers.scene(), Method::RadianceCache, SIZE, 4, change)
+}
+
+/// Pictures with records agree with those of path tracing, which many comparisons are made of.
+#[track_caller]
+fn agrees(buffers: &SceneBuffers, comparisons: usize) {
+    let values = |method, spp| -> Vec<Vec<f64>> {
+        let one = |seed| {
+            let result = render(&buffers.scene(), method, SIZE, spp, |s| s.seed = seed);
+            assert_eq!(result.counters.dropped.total(), 0);
+            if method == Method::RadianceCache {
+                assert!(number(&result, "view_bound_records", "records") > 20.0);
+            }
+            let mut values = blocks_of(&result.image, 4);
+            values.push(values.iter().sum::<f64>() / values.len() as f64);
+            values
+        };
+        (0..REPLICAS).map(one).collect()
+    };
+    let (path, cache) = (values(Method::Path, 128), values(Method::RadianceCache, 32));
+    let (last, light) = (path[0].len() - 1, path[0][path[0].len() - 1]);
+    let allowed = |i: usize, b: f64| if i < last { BIAS * (b + 0.1 * light) } else { BIAS_OF_MEAN * b };
+    agree_within(&cache, &path, comparisons, allowed).unwrap_or_else(|why| panic!("{why}"));
+}
+
+#[test]
+fn floors_and_blocks_of_narrow_lobes_agree_with_path_tracing() {
+    let roughness = |alpha: f32| alpha.sqrt();
+    agrees(&box_from_above(metal(roughness(0.1)), varnish(roughness(0.2))), 2);
+    agrees(&box_from_above(varnish(roughness(0.1)), metal(roughness(0.2))), 2);
+}
+
+/// A record beside a leg knows nothing of its sunny side: a boundary or a neighbour has to limit it.
+#[test]
+fn a_table_in_the_sun_agrees_with_path_tracing() {
+    agrees(&table_in_the_sun(metal(0.1f32.sqrt())), 2);
+    agrees(&table_in_the_sun(varnish(0.1f32.sqrt())), 2);
+}
+
+#[test]
+fn a_scene_without_narrow_lobes_has_no_records_of_them() {
+    let found = |buffers: &SceneBuffers| finding(&cached(buffers, |_| ()), "view_bound_records").decision;
+    assert_eq!(found(&cornell_box()), Decision::LeftOut);
+    // Coefficients serve these.
+    assert_eq!(found(&box_from_above(metal(0.6), varnish(0.7))), Decision::LeftOut);
+    assert_eq!(found(&box_from_above(metal(0.3), varnish(0.7))), Decision::Used);
+}
+
+/// The file has irradiance; what the camera sees is gathered anew.
+#[test]
+fn a_loaded_cache_gives_the_same_picture() {
+    let buffers = box_from_above(metal(0.3), varnish(0.7));
+    let file = std::env::temp_dir().join(format!("halflight-tests-{}-view", std::process::id()));
+    let saved = cached(&buffers, |s| s.save_cache = Some(file.clone()));
+    let loaded = cached(&buffers, |s| s.load_cache = Some(file.clone()));
+    std::fs::remove_file(file).unwrap();
+    assert_eq!(number(&loaded, "irradiance_cache", "gathered"), 0.0);
+    assert!(saved.image == loaded.image);
+}
