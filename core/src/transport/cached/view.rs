@@ -27,8 +27,8 @@ use glam::Vec3;
 /// Strata along a side of the lobe of a record.
 pub const SIDE: usize = 16;
 
-/// Alpha of the lobes that view-bound records serve.
-const ALPHAS: core::ops::RangeInclusive<f32> = 0.045..=0.26;
+/// Alpha of the lobes that view-bound records serve, from 0.05 but for rounding.
+const ALPHAS: core::ops::RangeInclusive<f32> = 0.049..=0.25;
 
 /// Smallest cosine of a viewer to the normal.
 const LEAST_COSINE: f32 = 0.05;
