@@ -148,10 +148,7 @@ impl ViewedLobe {
 
     /// g of the direction `wi`.
     fn weight(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        if !(wi.z > 0.0) {
-            return Rgb::ZERO;
-        }
-        self.tint(wo, wi) * self.ggx.reflection_weight(wo, wi)
+        if wi.z > 0.0 { self.tint(wo, wi) * self.ggx.reflection_weight(wo, wi) } else { Rgb::ZERO }
     }
 
     /// g of the direction `wi` for the viewer.
@@ -162,11 +159,9 @@ impl ViewedLobe {
 
     /// K of the direction `wi`.
     fn density(&self, wi: Vec3) -> Rgb {
-        if !(wi.z > 0.0) {
-            return Rgb::ZERO;
-        }
         let half = self.wo + wi;
-        self.tint(self.wo, wi) * (self.ggx.density(half) * self.ggx.visibility(self.wo, wi) * wi.z)
+        let lobe = || self.ggx.density(half) * self.ggx.visibility(self.wo, wi) * wi.z;
+        if wi.z > 0.0 { self.tint(self.wo, wi) * lobe() } else { Rgb::ZERO }
     }
 
     /// Viewers of places a step ahead and a step back along both axes.

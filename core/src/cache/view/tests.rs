@@ -93,12 +93,10 @@ fn light_of_one_radiance_has_the_gradient_of_the_albedo() {
 fn checkered(squares: f32) -> impl Fn(Vec3, Vec3) -> (f32, f32) {
     move |place, direction| {
         let t = (1.0 - place.x) / direction.x;
-        if !(t > 0.0) {
-            return (0.2, 0.0);
-        }
         let at = place + t * direction;
         let square = |x: f32| libm::floorf(squares * x + 0.3) as i32;
-        (if (square(at.y) + square(at.z)) % 2 == 0 { 1.0 } else { 0.25 }, 1.0 / t)
+        let radiance = if (square(at.y) + square(at.z)) % 2 == 0 { 1.0 } else { 0.25 };
+        if t > 0.0 { (radiance, 1.0 / t) } else { (0.2, 0.0) }
     }
 }
 
