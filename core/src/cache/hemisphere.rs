@@ -90,6 +90,23 @@ impl<'a> Hemisphere<'a> {
         squares * (PI * PI / (6.0 * strata * count))
     }
 
+    /// This hemisphere with radiances, written to `limited`, scaled down where their luminance exceeds twice
+    /// the mean: for decisions that must not follow the few strata that most of the noise comes from. `None`
+    /// if `limited` does not have n² values.
+    pub fn limited<'b>(&self, limited: &'b mut [[f32; 3]]) -> Option<Hemisphere<'b>>
+    where
+        'a: 'b,
+    {
+        let sum: f32 = self.radiance.iter().map(|&l| luminance(l.into())).sum();
+        let most = MOST_OVER_MEAN * sum / self.radiance.len() as f32;
+        for (limited, &radiance) in limited.iter_mut().zip(self.radiance) {
+            let here = luminance(radiance.into());
+            *limited = if here > most { radiance.map(|channel| channel * (most / here)) } else { radiance };
+        }
+        let found = Hemisphere::new(self.n, limited, self.inverse_distance, self.directions)?;
+        Some(Hemisphere { normals: self.normals, ..found })
+    }
+
     /// Statistics of the distances.
     pub(super) fn distances(&self) -> Distances {
         let (mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0f32);
@@ -106,6 +123,9 @@ impl<'a> Hemisphere<'a> {
         }
     }
 }
+
+/// Maximum luminance of a limited stratum over the mean of all.
+const MOST_OVER_MEAN: f32 = 2.0;
 
 /// Sum of the squared second differences of luminance along rows of `side` values, and their number. For
 /// independent values their mean is six times the variance of a value.
@@ -154,6 +174,20 @@ mod tests {
         assert!((variance(&noisy) / wanted - 1.0).abs() < 0.1, "{} {wanted}", variance(&noisy));
         let even: vec::Vec<_> = (0..N * N).map(|i| [(i % N) as f32; 3]).collect();
         assert!(variance(&even) < 1e-6 * wanted);
+    }
+
+    /// Four strata of 1, 1, 2 and 12 have the mean 4: the last is limited to 8, in its own colour.
+    #[test]
+    fn bright_strata_are_limited_to_twice_the_mean() {
+        let colour = Rgb::new(2.0, 0.5, 1.0) / luminance(Rgb::new(2.0, 0.5, 1.0));
+        let radiance = [1.0, 1.0, 2.0, 12.0].map(|l| (l * colour).to_array());
+        let hemisphere = |radiance| Hemisphere::new(2, radiance, &[1.0; 4], &[[0.0, 0.0, 1.0]; 4]).unwrap();
+        let mut limited = [[0.0; 3]; 4];
+        let found = hemisphere(&radiance).limited(&mut limited).unwrap();
+        assert_eq!(found.radiance()[..3], radiance[..3]);
+        assert!(Rgb::from(found.radiance()[3]).distance(8.0 * colour) < 1e-5, "{found:?}");
+        assert_eq!(hemisphere(&[[0.0; 3]; 4]).limited(&mut limited).unwrap().radiance(), [[0.0; 3]; 4]);
+        assert!(hemisphere(&radiance).limited(&mut limited[..3]).is_none());
     }
 
     /// In light 1 + s cos θ the moment is 2π (B(2, 6) + s B(3, 6)), with Euler's B(2, 6) = 1/42 and B(3, 6) =

@@ -70,6 +70,12 @@ impl Metric {
         matches!(self, Metric::RadiometricHessian | Metric::GeometricHessian)
     }
 
+    /// True if the radii are those of limited radiances: a record with more light than others, by a few
+    /// bright strata, must not have smaller radii for that.
+    pub const fn limits_radiance(self) -> bool {
+        matches!(self, Metric::Halflight)
+    }
+
     /// Derivatives for this metric: by strata borders, so that all metrics extrapolate by equal gradients,
     /// with the Hessian of the metric; for [`Metric::OcclusionHessian`] all as in the paper. `None` if the
     /// tables have another number of strata, or normals are missing.

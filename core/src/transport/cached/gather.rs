@@ -9,7 +9,7 @@ use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::cache::irradiance::{
-    CellFlux, Hemisphere, OVERHANG_RADIUS_FACTOR, QueryPoint, Record, metric, validity,
+    CellFlux, Hemisphere, Metric, OVERHANG_RADIUS_FACTOR, QueryPoint, Record, metric, validity,
 };
 use crate::cache::radiance::derivatives::border_flux;
 use crate::cache::radiance::{Coefficients, PooledRecord, StrataTables, write};
@@ -155,6 +155,8 @@ pub struct Gathering<'a> {
 pub(in crate::transport) struct HemisphereSamples<'m> {
     pub(in crate::transport) n: usize,
     pub(in crate::transport) radiance: &'m mut [[f32; 3]],
+    /// Radiances that decide on the radii; empty if the metric does not limit them.
+    limited: &'m mut [[f32; 3]],
     pub(in crate::transport) inverse_distance: &'m mut [f32],
     pub(in crate::transport) directions: &'m mut [[f32; 3]],
     /// Local normals of the hits; empty if the metric does not need them.
@@ -167,17 +169,19 @@ impl<'m> HemisphereSamples<'m> {
     pub(super) fn footprint(n: usize) -> Footprint {
         let strata = n.saturating_mul(n);
         let triples = Footprint::default().slice::<[f32; 3]>(strata);
-        triples.and(triples).and(triples).slice::<f32>(strata)
+        triples.and(triples).and(triples).and(triples).slice::<f32>(strata)
     }
 
-    pub(super) fn new(n: usize, normals: bool, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub(super) fn new(n: usize, metric: Metric, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let strata = n.saturating_mul(n);
+        let strata_if = |is_needed| if is_needed { strata } else { 0 };
         Ok(Self {
             n,
             radiance: arena.slice(strata)?,
             inverse_distance: arena.slice(strata)?,
             directions: arena.slice(strata)?,
-            normals: arena.slice(if normals { strata } else { 0 })?,
+            limited: arena.slice(strata_if(metric.limits_radiance()))?,
+            normals: arena.slice(strata_if(metric.takes_normals()))?,
             shining: 0,
         })
     }
@@ -185,6 +189,12 @@ impl<'m> HemisphereSamples<'m> {
     fn hemisphere(&self) -> Option<Hemisphere<'_>> {
         let hemisphere = Hemisphere::new(self.n, self.radiance, self.inverse_distance, self.directions)?;
         if self.normals.is_empty() { Some(hemisphere) } else { hemisphere.with_normals(self.normals) }
+    }
+
+    /// Hemisphere of limited radiances, if the metric limits them.
+    fn limited(&mut self) -> Option<Hemisphere<'_>> {
+        let hemisphere = Hemisphere::new(self.n, self.radiance, self.inverse_distance, self.directions)?;
+        hemisphere.limited(self.limited)
     }
 }
 
@@ -236,7 +246,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
         let mut arena = scratch.scratch();
-        let mut strata = HemisphereSamples::new(n, metric.metric.takes_normals(), &mut arena)?;
+        let mut strata = HemisphereSamples::new(n, metric.metric, &mut arena)?;
         let frame = Frame::from_normal(place.normal());
         let generate = |i| self.generate_gather_ray(place, &frame, (number, i), n);
         self.trace_strata(&frame, &mut strata, &mut arena, generate, counters)?;
@@ -249,7 +259,8 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         };
         let picture = place.pixel * libm::sqrtf(self.settings.width as f32 * self.settings.height as f32);
         let settings = metric::Settings { least: least_pixels * place.pixel, ..metric.within(picture) };
-        let reach = validity(&settings, &derivatives);
+        let limited = strata.limited().and_then(|h| metric.metric.derivatives(self.context.level, flux, &h));
+        let reach = validity(&settings, limited.as_ref().unwrap_or(&derivatives));
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
         let luminance = derivatives.luminance();
         record.set_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
