@@ -8,6 +8,7 @@
 //! number of threads.
 
 use super::RenderContext;
+use super::cache_resolution::CacheResolution;
 use super::caustics::{self, CausticPathTracing};
 use super::counts::{self, LightPaths};
 use super::executor::{Executor, Passed};
@@ -40,20 +41,13 @@ const FEWEST_SAMPLES: f64 = 4.0;
 const PILOT_RAYS: f64 = 5e5;
 const PILOT_SHARE: f64 = 0.08;
 
-/// Work of a ray of cached paths, with its share of lookups and light samples, and of a gather ray.
+/// Work of a ray of cached paths, with its share of lookups and light samples.
 const CACHED_RAY: f64 = 1.8;
-const GATHER_RAY: f64 = 1.5;
-
-/// Gather rays for each pixel of a picture of one pixel, with [`USUAL_RAYS`] for a record; they fall with
-/// this power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a factor of two.
-const GATHER_RAYS: f64 = 5700.0;
-const GATHER_POWER: f64 = 0.4;
-const USUAL_RAYS: f64 = 256.0;
 
 /// Records whose mean a lookup returns.
 const RECORDS: f64 = 20.0;
 
-/// relMSE of interpolation without noise.
+/// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
 const BIAS: f64 = 3e-4;
 
 /// Greatest fraction of the work for filling; radii grow if filling needs more.
@@ -150,8 +144,8 @@ pub struct Trial {
     pub reuse: f64,
     /// Pixels of the picture.
     pub pixels: f64,
-    /// Gather rays of a record.
-    pub record_rays: f64,
+    /// Gather rays and density of the records.
+    pub resolution: CacheResolution,
     /// Parts in which the picture is rendered, each with caches of its own.
     pub shards: f64,
     /// Whether caustic photons belong to the picture.
@@ -172,7 +166,7 @@ pub fn scratch<F: Features>() -> Footprint {
 }
 
 impl Trial {
-    /// Trial of `paths`, joined with photons if they pay; records would gather light with `record_rays` each.
+    /// Trial of `paths`, joined with photons if they pay; a cache would have this `resolution`.
     /// `None` where the executor is over.
     ///
     /// # Errors
@@ -180,7 +174,7 @@ impl Trial {
     pub fn run<F: Features>(
         context: &RenderContext,
         paths: &mut CausticPathTracing<F>,
-        (record_rays, shards): (u32, u32),
+        (resolution, shards): (CacheResolution, u32),
         executor: &mut impl Executor,
     ) -> Result<Option<Self>, OutOfMemory> {
         // Samples that the picture does not have.
@@ -203,8 +197,8 @@ impl Trial {
             Some(pilot) => f64::from(pilot.cost()) / f64::from(pilot.gain()).min(counts::REUSE_GAIN),
             None => 1.0,
         };
-        let (pixels, record_rays, shards) = (context.pixels() as f64, record_rays.into(), shards.into());
-        Ok(Some(Self { reuse, pixels, record_rays, shards, has_photons, ..Self::of(&tiles) }))
+        let (pixels, shards) = (context.pixels() as f64, shards.into());
+        Ok(Some(Self { reuse, pixels, resolution, shards, has_photons, ..Self::of(&tiles) }))
     }
 
     /// Noise and work of `tiles`.
@@ -235,12 +229,13 @@ impl Trial {
     /// relMSE with an irradiance cache after so much work for each pixel. `rare` is the noise of paths by
     /// rare light, as a factor on that of the trial.
     pub fn error_of_cache(&self, work: f64, rare: f64) -> f64 {
-        let of_record = self.shards * self.record_rays / USUAL_RAYS;
-        let filling = of_record * GATHER_RAY * GATHER_RAYS * libm::pow(self.pixels, -GATHER_POWER);
+        let filling = self.shards * self.resolution.filling(self.pixels);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
-        let gathered = (self.noise[0] - self.noise[1]).max(0.0) / (self.record_rays * RECORDS);
-        rare * self.noise[1] * CACHED_RAY * self.work[1] / left + wider * (rare * gathered + BIAS)
+        let record_rays = f64::from(self.resolution.strata).powi(2);
+        let gathered = (self.noise[0] - self.noise[1]).max(0.0) / (record_rays * RECORDS);
+        let bias = BIAS * f64::from(self.resolution.error / CacheResolution::COARSEST.error);
+        rare * self.noise[1] * CACHED_RAY * self.work[1] / left + wider * (rare * gathered + bias)
     }
 
     /// Errors after so much work for each pixel.

@@ -5,6 +5,7 @@
 //! tasks of its passes: no method knows of threads, clocks or files.
 
 pub mod bidirectional;
+pub mod cache_resolution;
 pub mod caustics;
 pub mod choice;
 #[cfg(test)]

@@ -23,6 +23,8 @@ use halflight_core::findings::Decision::LeftOut;
 use halflight_core::findings::{Finding, Findings};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
+use halflight_core::method::cache_resolution::CacheResolution;
+use halflight_core::method::choice::Goal;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, UNLIMITED};
@@ -109,8 +111,8 @@ impl WithFeatures for Render<'_> {
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
         let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let affords_pilots = method != Method::Path || plain.goal().affords_pilots(pixels);
-        let without = (!affords_pilots).then(|| without_pilots(settings));
-        let settings = without.as_ref().unwrap_or(settings);
+        let within_time = within_time(settings, &plain.goal(), affords_pilots);
+        let settings = &within_time;
         let plain = RenderSetup { settings, ..plain };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
         let setup = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
@@ -189,15 +191,23 @@ fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
     is_lost && has_time && settings.shard == Shard::WHOLE
 }
 
-/// Settings of a picture whose time suffices for a few samples of each pixel: paths without the structures
-/// that a pilot chooses.
-fn without_pilots(settings: &Settings) -> Settings {
-    Settings {
-        caustics: false,
-        reuse: settings.reuse.or(Some(false)),
-        environment_visibility: settings.environment_visibility.or(Some(false)),
-        ..settings.clone()
+/// Settings that suit the time of the picture: paths without the structures that a pilot chooses where it
+/// suffices for a few samples of each pixel, and finer caches where it alone ends the picture.
+fn within_time(settings: &Settings, goal: &Goal, affords_pilots: bool) -> Settings {
+    let mut own = settings.clone();
+    if !affords_pilots {
+        own.caustics = false;
+        own.reuse = own.reuse.or(Some(false));
+        own.environment_visibility = own.environment_visibility.or(Some(false));
     }
+    let has_file = settings.load_cache.is_some() || settings.save_cache.is_some();
+    if let Goal { rays: Some(rays), samples: None, error: None } = *goal
+        && !has_file
+    {
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        own.cache = own.cache.with(CacheResolution::of_budget(rays / pixels, pixels, settings.shard.count));
+    }
+    own
 }
 
 /// Path settings common to all methods.

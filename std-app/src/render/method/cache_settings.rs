@@ -1,6 +1,7 @@
 //! Settings of irradiance caches.
 
 use halflight_core::cache::irradiance::{Metric, metric};
+use halflight_core::method::cache_resolution::CacheResolution;
 
 /// Settings for filling an irradiance cache.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,11 +17,28 @@ pub struct CacheSettings {
 
 impl CacheSettings {
     /// Default number of strata along a side.
-    pub const STRATA: u32 = 16;
+    pub const STRATA: u32 = CacheResolution::COARSEST.strata;
 
     /// Strata along a side, by request or default.
     pub fn strata(&self) -> u32 {
         self.strata.unwrap_or(Self::STRATA)
+    }
+
+    /// Gather rays and density of the records; other metrics are taken for as dense as the default.
+    pub(in crate::render) fn resolution(&self) -> CacheResolution {
+        let error = match self.metric {
+            Metric::Halflight => self.allowed(),
+            _ => CacheResolution::COARSEST.error,
+        };
+        CacheResolution { strata: self.strata(), error }
+    }
+
+    /// These settings with `resolution`, unless a part of it is requested.
+    pub(in crate::render) fn with(self, resolution: CacheResolution) -> Self {
+        if self.metric != Metric::Halflight || self.error.is_some() || self.strata.is_some() {
+            return self;
+        }
+        Self { error: Some(resolution.error), strata: Some(resolution.strata), ..self }
     }
 
     /// Allowed error, by request or default.

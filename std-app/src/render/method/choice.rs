@@ -30,7 +30,7 @@ pub(super) fn choose<'a, F: Features>(
     if !goal.affords_trial(context.pixels()) {
         return Ok(None);
     }
-    let records = (settings.cache.strata().pow(2), settings.shard.count);
+    let records = (settings.cache.resolution(), settings.shard.count);
     let Some(trial) = Trial::run(&context, paths, records, executor)? else { return Ok(None) };
     let is_audited = settings.audit.is_none_or(|share| share > 0.0);
     let light_paths = match trial.affords_light_paths(&goal) {
