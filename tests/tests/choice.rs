@@ -120,7 +120,7 @@ fn path_tracing_takes_the_place_of_a_chosen_method_whose_bias_exceeds_the_reques
     let room = room_with_up_light();
     let path = std::env::temp_dir().join(format!("halflight-fallback-{}", std::process::id()));
     let to_error = |settings: &mut Settings| {
-        settings.stop = Stop { error: Some(2e-3), ..Stop::default() };
+        settings.stop = Stop { error: Some(1e-3), ..Stop::default() };
         // The prediction assumes records of the usual density.
         settings.cache.error = Some(1.0);
     };
