@@ -1,5 +1,5 @@
-//! View-bound records against path tracing: floors of narrow metal and of varnish, and a table in the sun, whose
-//! legs are small bright things close to the surface.
+//! View-bound records against path tracing: floors of narrow metal and of varnish, and a table in the sun,
+//! whose legs are small bright things close to the surface.
 
 use halflight::render::{Method, RenderResult, Settings};
 use halflight_core::findings::Decision;

@@ -55,7 +55,8 @@ impl Bsdf {
         }
     }
 
-    /// GGX alpha of the rough reflection of a metal or of a coat. `None` for smooth and transmitting surfaces.
+    /// GGX alpha of the rough reflection of a metal or of a coat. `None` for smooth and transmitting
+    /// surfaces.
     pub(crate) fn reflection_alpha(&self) -> Option<f32> {
         let alpha = match self {
             Bsdf::Conductor(b) => b.alpha,

@@ -41,7 +41,7 @@ impl CacheResolution {
     /// Work of filling for each of `pixels` pixels, in rays of paths.
     pub fn filling(&self, pixels: f64) -> f64 {
         let relative = |of: fn(&Self) -> f64| of(self) / of(&Self::COARSEST);
-        let rays = relative(|resolution| f64::from(resolution.strata).powi(2));
+        let rays = relative(|resolution| f64::from(resolution.strata * resolution.strata));
         // Errors grow with the fourth power of radii.
         let records = 1.0 / libm::sqrt(relative(|resolution| resolution.error.into()));
         GATHER_RAY * GATHER_RAYS * rays * records * libm::pow(pixels, -GATHER_POWER)

@@ -232,7 +232,7 @@ impl Trial {
         let filling = self.shards * self.resolution.filling(self.pixels);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
-        let record_rays = f64::from(self.resolution.strata).powi(2);
+        let record_rays = f64::from(self.resolution.strata * self.resolution.strata);
         let gathered = (self.noise[0] - self.noise[1]).max(0.0) / (record_rays * RECORDS);
         let bias = BIAS * f64::from(self.resolution.error / CacheResolution::COARSEST.error);
         rare * self.noise[1] * CACHED_RAY * self.work[1] / left + wider * (rare * gathered + bias)

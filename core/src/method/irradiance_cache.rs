@@ -7,7 +7,7 @@
 
 use super::executor::{Executor, Passed};
 use super::record_placement::{CacheBuilder, LobeGathering, RecordPlacement, step_footprint, step_points};
-use super::view_placement::{self, ViewBuilder, ViewPlacement};
+use super::view_placement::{ViewPlacement, Views};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
@@ -16,7 +16,6 @@ use crate::cache::view::ViewRecords;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::scene::Scene;
 use crate::transport::cached::gather::GatherPoint;
-use crate::transport::cached::view::{self, ViewPoint};
 use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 
 /// Pixels for each record of a cache without a limit of memory.
@@ -34,10 +33,6 @@ const TIME: f32 = 0.25;
 
 /// The same for the view-bound records of both halves, of the time that is left then.
 const VIEW_TIME: f32 = 0.15;
-
-/// Pixels for each view-bound record, and the fewest records.
-const PIXELS_PER_VIEW_RECORD: usize = 16;
-const FEWEST_VIEW_RECORDS: usize = 1024;
 
 /// Strata along a side behind rough surfaces are half as many, in multiples of this.
 const BLOCK: usize = 8;
@@ -111,39 +106,6 @@ pub struct IrradianceCaching<'a, F> {
     widens: bool,
     is_frozen: bool,
     is_cut: bool,
-}
-
-/// View-bound records of the even and of the odd samples, and the points of a step of their placement.
-struct Views<'a> {
-    builders: [ViewBuilder<'a>; 2],
-    step: &'a mut [ViewPoint],
-    is_cut: bool,
-}
-
-impl<'a> Views<'a> {
-    fn footprint(capacity: usize) -> Footprint {
-        let builder = ViewBuilder::footprint(capacity);
-        builder.and(builder).and(view_placement::step_footprint())
-    }
-
-    /// Records for the narrow lobes of `context`, if it has any and there is memory beside `reserve` bytes.
-    fn new(
-        context: &RenderContext<'a>,
-        reserve: usize,
-        memory: &mut impl MemorySource<'a>,
-    ) -> Result<Option<Self>, OutOfMemory> {
-        let capacity = (context.pixels() / PIXELS_PER_VIEW_RECORD).max(FEWEST_VIEW_RECORDS);
-        let footprint = Self::footprint(capacity);
-        let needed = footprint.bytes().saturating_add(reserve);
-        if !view::may_serve(context.scene) || memory.available() < needed {
-            return Ok(None);
-        }
-        let mut arena = memory.take("view-bound records", footprint)?;
-        let bounds = context.bvh.bounds();
-        let mut builder = |index| ViewBuilder::new(&bounds, capacity, index, &mut arena);
-        let builders = [builder(0)?, builder(1)?];
-        Ok(Some(Self { builders, step: view_placement::step_points(&mut arena)?, is_cut: false }))
-    }
 }
 
 impl<'a, F: Features> IrradianceCaching<'a, F> {
@@ -406,81 +368,4 @@ impl<F: Features> Method for IrradianceCaching<'_, F> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bsdf::DiffuseOnly;
-    use crate::memory::{Buffer, Line};
-    use crate::method::closed_box::{SIDE, cornell, furnace, with_box};
-    use crate::method::{Loop, RenderState, Shard};
-    use crate::scene::Material;
-    use std::vec;
-    use std::vec::Vec;
-
-    type Caching<'a> = IrradianceCaching<'a, DiffuseOnly>;
-
-    const SETTINGS: CacheSettings = CacheSettings {
-        metric: Metric::Halflight,
-        error: 1e-4,
-        strata: 8,
-        fewest: 1000,
-        reserve: 0,
-        widens: true,
-        lobes: None,
-    };
-
-    fn lines() -> usize {
-        let caches = CacheBuilder::footprint(SETTINGS.fewest, None);
-        let film = RenderState::footprint(SIDE, SIDE);
-        let all = Caching::scratch(&SETTINGS).and(film).and(SETTINGS.gathering_footprint());
-        all.and(caches).and(caches).bytes() / 64
-    }
-
-    /// Renders in `lines` lines of memory, in rounds to these numbers of samples, `step` samples of a tile at
-    /// a time. Returns the mean radiance of each pixel, and the number of records.
-    fn render(
-        materials: [Material; 4],
-        lines: usize,
-        rounds: &[u32],
-        step: u32,
-    ) -> Result<(Vec<[f32; 3]>, usize), OutOfMemory> {
-        let mut lines = vec![Line([0; 64]); lines];
-        with_box(materials, |context| {
-            let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut lines));
-            let scratch = Caching::scratch(&SETTINGS);
-            let scratch = buffer.take("paths", scratch)?.slice::<u8>(scratch.bytes())?;
-            let mut film = buffer.take("film", RenderState::footprint(SIDE, SIDE))?;
-            let mut state = RenderState::new(SIDE, SIDE, Shard::WHOLE, &mut film)?;
-            let mut method = Caching::new(context, &SETTINGS, &mut buffer)?;
-            let mut executor = Loop::new(scratch);
-            for &target in rounds {
-                method.round(&mut Round { executor: &mut executor, state: &mut state, target, step })?;
-            }
-            assert_eq!(state.spp(), *rounds.last().unwrap());
-            let records = method.caches().map(|cache| cache.records().len());
-            assert!(records.iter().all(|records| (50..1000).contains(records)), "{records:?}");
-            let mean = |pixel: &crate::film::Pixel| pixel.mean().to_array();
-            Ok((state.film.pixels().iter().map(mean).collect(), records[0] + records[1]))
-        })
-    }
-
-    #[test]
-    fn a_cornell_box_has_the_same_bits_for_any_rounds_and_steps() {
-        let at_once = render(cornell(), lines(), &[6], 6).unwrap();
-        assert!(render(cornell(), lines(), &[1, 2, 6], 1).unwrap() == at_once);
-    }
-
-    #[test]
-    fn a_furnace_has_the_radiance_of_the_series() {
-        let (pixels, _) = render(furnace(), lines(), &[8], 8).unwrap();
-        let mean = pixels.iter().flatten().sum::<f32>() / (3 * pixels.len()) as f32;
-        assert!((mean / 2.0 - 1.0).abs() < 0.01, "{mean}");
-    }
-
-    #[test]
-    fn exact_memory_is_enough_and_a_line_less_is_an_error() {
-        assert!(render(cornell(), lines(), &[2], 2).is_ok());
-        for less in [1, 100, lines() / 2, lines()] {
-            assert!(render(cornell(), lines() - less, &[2], 2).is_err(), "{less}");
-        }
-    }
-}
+mod tests;

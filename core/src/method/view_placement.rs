@@ -1,6 +1,7 @@
 //! Placement of view-bound records, after both irradiance caches are filled, in the order of pixels in which
 //! these were ([`super::record_placement`]).
 
+use super::RenderContext;
 use super::executor::{Executor, Passed};
 use super::record_placement::builder::{SWEEPS_MAX, adds_few};
 use super::record_placement::{POINTS_PER_COMMIT, retain};
@@ -8,9 +9,9 @@ use crate::bsdf::Features;
 use crate::cache::irradiance::{IrradianceCache, QueryPoint, metric};
 use crate::cache::view::ViewRecords;
 use crate::geometry::Bounds;
-use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::cached::placement::{PIXELS, ProgressiveOrder};
-use crate::transport::cached::view::{SIDE, ViewGathering, ViewPoint};
+use crate::transport::cached::view::{SIDE, ViewGathering, ViewPoint, may_serve};
 use crate::transport::{CausticMerging, Counters, PathIntegrator};
 
 /// Pixels along the side of the square of which one pixel is looked at.
@@ -21,6 +22,44 @@ const STEP: usize = 8 * PIXELS;
 
 /// Gather rays of a record.
 pub const RAYS: usize = SIDE * SIDE;
+
+/// Pixels for each record, and the fewest records.
+const PIXELS_PER_RECORD: usize = 16;
+const FEWEST_RECORDS: usize = 1024;
+
+/// View-bound records of the even and of the odd samples, and the points of a step of their placement.
+pub(super) struct Views<'a> {
+    pub(super) builders: [ViewBuilder<'a>; 2],
+    pub(super) step: &'a mut [ViewPoint],
+    /// True if there was no time for all records.
+    pub(super) is_cut: bool,
+}
+
+impl<'a> Views<'a> {
+    fn footprint(capacity: usize) -> Footprint {
+        let builder = ViewBuilder::footprint(capacity);
+        builder.and(builder).and(step_footprint())
+    }
+
+    /// Records for the narrow lobes of `context`, if it has any and there is memory beside `reserve` bytes.
+    pub(super) fn new(
+        context: &RenderContext<'a>,
+        reserve: usize,
+        memory: &mut impl MemorySource<'a>,
+    ) -> Result<Option<Self>, OutOfMemory> {
+        let capacity = (context.pixels() / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
+        let footprint = Self::footprint(capacity);
+        let needed = footprint.bytes().saturating_add(reserve);
+        if !may_serve(context.scene) || memory.available() < needed {
+            return Ok(None);
+        }
+        let mut arena = memory.take("view-bound records", footprint)?;
+        let bounds = context.bvh.bounds();
+        let mut builder = |index| ViewBuilder::new(&bounds, capacity, index, &mut arena);
+        let builders = [builder(0)?, builder(1)?];
+        Ok(Some(Self { builders, step: step_points(&mut arena)?, is_cut: false }))
+    }
+}
 
 /// View-bound records under construction.
 pub struct ViewBuilder<'m> {

@@ -186,8 +186,8 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Calls `visit` with each record that is valid at a point, its number, the value that it extrapolates and
-    /// its weight.
+    /// Calls `visit` with each record that is valid at a point, its number, the value that it extrapolates
+    /// and its weight.
     pub(in crate::cache) fn visit_extrapolated(
         &self,
         point: &QueryPoint,

@@ -5,14 +5,15 @@
 //!
 //!   R(x) = ∫ L(x, w(u; x)) g(u; x) du.
 //!
-//! Reflectance is relative to that of the mirror direction, so that a texture of it does not show in R. Strata
-//! move with the viewer by ∂w, and their content by the inverse distance u_e of the nearer side of a border:
+//! Reflectance is relative to that of the mirror direction, so that a texture of it does not show in R.
+//! Strata move with the viewer by ∂w, and their content by the inverse distance u_e of the nearer side of a
+//! border:
 //!
 //!   ∂_f R = ∫ L ∂_f g du + Σ dL ∫ K (u_e ν·f + ν·∂_f w) ds,
 //!
 //! K is the density of the lobe, ν points from the first stratum to the second, and dL is the second radiance
-//! minus the first. Borders wrap around in the azimuth. The Hessian takes the lobe as rigid, so that the scene
-//! is unfolded to the inverse distance u_e + 1/d, d the distance to the camera:
+//! minus the first. Borders wrap around in the azimuth. The Hessian takes the lobe as rigid, so that the
+//! scene is unfolded to the inverse distance u_e + 1/d, d the distance to the camera:
 //!
 //!   H = Σ dL (u_e + 1/d)² Sym ∫ ν ⊗ (3 K w - ∇K) ds.
 //!

@@ -2,8 +2,8 @@
 //! towards the camera is a scalar field on the surface, as irradiance is.
 //!
 //! [`ViewedLobe`] has the strata of one lobe and the derivatives of the radiance that it reflects.
-//! [`ViewRecords`] keeps records of many points in the octree of irradiance, with the same weights, boundaries,
-//! comparison of neighbours and clamping.
+//! [`ViewRecords`] keeps records of many points in the octree of irradiance, with the same weights,
+//! boundaries, comparison of neighbours and clamping.
 
 mod lobe;
 mod records;

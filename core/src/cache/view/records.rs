@@ -34,8 +34,8 @@ impl LobeKind {
     }
 }
 
-/// Records of reflected radiance over the reflectance of the mirror direction, in place of irradiance, and the
-/// kinds of their lobes.
+/// Records of reflected radiance over the reflectance of the mirror direction, in place of irradiance, and
+/// the kinds of their lobes.
 #[derive(Debug)]
 pub struct ViewRecords<'m> {
     cache: IrradianceCache<'m>,

@@ -1,3 +1,5 @@
+//! Radiance of lobes, and its gradient, against known light and brute force.
+
 use super::lobe::ReflectedRadiance;
 use super::*;
 use crate::Rgb;
@@ -65,8 +67,8 @@ fn difference(of: &dyn Fn(Vec3) -> f64, place: Vec3, step: f32) -> Vec2 {
 
 const EYE: Vec3 = Vec3::new(-1.2, 0.2, 1.0);
 
-/// Light of one radiance everywhere is reflected by the albedo of the lobe, over the reflectance of the mirror
-/// direction, and has the gradient of that albedo.
+/// Light of one radiance everywhere is reflected by the albedo of the lobe, over the reflectance of the
+/// mirror direction, and has the gradient of that albedo.
 #[test]
 fn light_of_one_radiance_has_the_gradient_of_the_albedo() {
     let light = |_: Vec3, _: Vec3| (1.0, 0.7);

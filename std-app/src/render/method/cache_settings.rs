@@ -24,8 +24,8 @@ impl CacheSettings {
         self.strata.unwrap_or(Self::STRATA)
     }
 
-    /// Gather rays and density of the records; coarser ones, and those of other metrics, are taken for as dense
-    /// as the default.
+    /// Gather rays and density of the records. Coarser ones, and those of other metrics, are taken for as
+    /// dense as the default.
     pub(in crate::render) fn resolution(&self) -> CacheResolution {
         let error = match self.metric {
             Metric::Halflight => self.allowed().min(CacheResolution::COARSEST.error),
