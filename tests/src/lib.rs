@@ -1,4 +1,5 @@
 //! Shared helpers of the cross-crate tests.
+pub mod agreement;
 pub mod memory;
 pub mod render;
 pub mod scenes;

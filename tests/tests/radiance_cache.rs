@@ -4,21 +4,12 @@
 use halflight::render::{Method, RenderResult, Settings};
 use halflight_core::findings::Decision;
 use halflight_core::scene::Material;
-use halflight_tests::render::{blocks_of, finding, number, render, try_render};
+use halflight_tests::agreement::Agreement;
+use halflight_tests::render::{finding, number, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, metal, rough_box};
-use halflight_tests::statistics::agree_within;
 use std::path::{Path, PathBuf};
 
 const SIZE: u32 = 48;
-
-/// Independent pictures of each method.
-const REPLICAS: u32 = 8;
-
-/// Largest bias of a block of 6 × 6 pixels, as a share of its light plus a tenth of the mean.
-const BIAS: f64 = 0.08;
-
-/// Largest relative bias of the picture's mean.
-const BIAS_OF_MEAN: f64 = 0.003;
 
 fn cached(buffers: &SceneBuffers, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(&buffers.scene(), Method::RadianceCache, SIZE, 4, change)
@@ -26,21 +17,8 @@ fn cached(buffers: &SceneBuffers, change: impl FnOnce(&mut Settings)) -> RenderR
 
 #[test]
 fn the_box_agrees_with_path_tracing() {
-    let buffers = rough_box();
-    let values = |method, spp| -> Vec<Vec<f64>> {
-        let one = |seed| {
-            let result = render(&buffers.scene(), method, SIZE, spp, |s| s.seed = seed);
-            assert_eq!(result.counters.dropped.total(), 0);
-            let mut values = blocks_of(&result.image, 6);
-            values.push(values.iter().sum::<f64>() / values.len() as f64);
-            values
-        };
-        (0..REPLICAS).map(one).collect()
-    };
-    let (path, cache) = (values(Method::Path, 128), values(Method::RadianceCache, 32));
-    let (last, light) = (path[0].len() - 1, path[0][path[0].len() - 1]);
-    let allowed = |i: usize, b: f64| if i < last { BIAS * (b + 0.1 * light) } else { BIAS_OF_MEAN * b };
-    agree_within(&cache, &path, 2, allowed).unwrap_or_else(|why| panic!("{why}"));
+    let agreement = Agreement { size: SIZE, block: 6, bias: 0.08, comparisons: 2 };
+    agreement.assert(&rough_box(), Method::RadianceCache, |_| ());
 }
 
 #[test]

@@ -3,45 +3,24 @@
 
 use halflight::render::{Method, RenderResult, Settings};
 use halflight_core::findings::Decision;
-use halflight_tests::render::{blocks_of, finding, number, render};
+use halflight_tests::agreement::Agreement;
+use halflight_tests::render::{finding, number, render};
 use halflight_tests::scenes::{SceneBuffers, box_from_above, cornell_box, metal, table_in_the_sun, varnish};
-use halflight_tests::statistics::agree_within;
 
 const SIZE: u32 = 48;
-
-/// Independent pictures of each method.
-const REPLICAS: u32 = 8;
-
-/// Largest bias of a block of 4 × 4 pixels, as a share of its light plus a tenth of the mean.
-const BIAS: f64 = 1.0 / 6.0;
-
-/// Largest relative bias of the picture's mean.
-const BIAS_OF_MEAN: f64 = 0.003;
 
 fn cached(buffers: &SceneBuffers, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(&buffers.scene(), Method::RadianceCache, SIZE, 4, change)
 }
 
-/// Pictures with records agree with those of path tracing, which many comparisons are made of.
+/// Pictures with records agree with those of path tracing, which many comparisons are made of. The bias of a
+/// block of 4 × 4 pixels is a sixth at most.
 #[track_caller]
 fn agrees(buffers: &SceneBuffers, comparisons: usize) {
-    let values = |method, spp| -> Vec<Vec<f64>> {
-        let one = |seed| {
-            let result = render(&buffers.scene(), method, SIZE, spp, |s| s.seed = seed);
-            assert_eq!(result.counters.dropped.total(), 0);
-            if method == Method::RadianceCache {
-                assert!(number(&result, "view_bound_records", "records") > 20.0);
-            }
-            let mut values = blocks_of(&result.image, 4);
-            values.push(values.iter().sum::<f64>() / values.len() as f64);
-            values
-        };
-        (0..REPLICAS).map(one).collect()
-    };
-    let (path, cache) = (values(Method::Path, 128), values(Method::RadianceCache, 32));
-    let (last, light) = (path[0].len() - 1, path[0][path[0].len() - 1]);
-    let allowed = |i: usize, b: f64| if i < last { BIAS * (b + 0.1 * light) } else { BIAS_OF_MEAN * b };
-    agree_within(&cache, &path, comparisons, allowed).unwrap_or_else(|why| panic!("{why}"));
+    let agreement = Agreement { size: SIZE, block: 4, bias: 1.0 / 6.0, comparisons };
+    agreement.assert(buffers, Method::RadianceCache, |result| {
+        assert!(number(result, "view_bound_records", "records") > 20.0);
+    });
 }
 
 #[test]

@@ -1,0 +1,51 @@
+//! Agreement of a method with path tracing on one scene, by blocks of pixels and by the mean of the picture.
+
+use crate::render::{blocks_of, render};
+use crate::scenes::SceneBuffers;
+use crate::statistics::agree_within;
+use halflight::render::{Method, RenderResult};
+
+/// Independent pictures of each method.
+const REPLICAS: u32 = 8;
+
+/// Largest relative bias of the picture's mean.
+const BIAS_OF_MEAN: f64 = 0.003;
+
+/// Pictures of a square size, and the bias that blocks may have.
+#[derive(Clone, Copy)]
+pub struct Agreement {
+    /// Pixels along a side of the picture, and of a block.
+    pub size: u32,
+    /// See `size`.
+    pub block: u32,
+    /// Largest bias of a block, as a share of its light plus a tenth of the mean.
+    pub bias: f64,
+    /// Comparisons of the test, for the level of significance.
+    pub comparisons: usize,
+}
+
+impl Agreement {
+    /// Asserts that 32 samples of `method` agree with 128 of path tracing; `check` sees each picture of the
+    /// method.
+    #[track_caller]
+    pub fn assert(&self, buffers: &SceneBuffers, method: Method, check: impl Fn(&RenderResult)) {
+        let values = |of, spp| -> Vec<Vec<f64>> {
+            let one = |seed| {
+                let result = render(&buffers.scene(), of, self.size, spp, |s| s.seed = seed);
+                assert_eq!(result.counters.dropped.total(), 0);
+                if of == method {
+                    check(&result);
+                }
+                let mut values = blocks_of(&result.image, self.block);
+                values.push(values.iter().sum::<f64>() / values.len() as f64);
+                values
+            };
+            (0..REPLICAS).map(one).collect()
+        };
+        let (path, found) = (values(Method::Path, 128), values(method, 32));
+        let (last, light) = (path[0].len() - 1, path[0][path[0].len() - 1]);
+        let allowed =
+            |i: usize, b: f64| if i < last { self.bias * (b + 0.1 * light) } else { BIAS_OF_MEAN * b };
+        agree_within(&found, &path, self.comparisons, allowed).unwrap_or_else(|why| panic!("{why}"));
+    }
+}
