@@ -2,7 +2,7 @@
 
     HALFLIGHT=program HALFLIGHT_SCENES=folder python3 tests/peers/best_peers.py [scene ...] [--seconds 10] [--seeds 1]
 
-Ours: `--method auto` for so many seconds of one thread. Mitsuba: `path` and `ptracer`, `llvm_ad_rgb`, by the
+Ours: `--method auto` for the given seconds of one thread. Mitsuba: `path` and `ptracer`, `llvm_ad_rgb`, by the
 samples that it makes in these seconds of the processor.
 LuxCore, where `LUXCORE` names the python of a virtual environment that has it, and where it has the words for a
 scene: `BIDIRVMCPU` and `PATHCPU` with its caustic cache, with three radii each. All of 128 x 128 pixels, judged

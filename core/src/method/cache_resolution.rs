@@ -1,6 +1,8 @@
 //! Resolution of an irradiance cache by the work of its picture: more gather rays for each record, and more
 //! records, where their gathering is a part of the work.
 
+use crate::cache::irradiance::metric::HESSIAN_ERROR;
+
 /// Work of a gather ray, in rays of paths.
 const GATHER_RAY: f64 = 1.5;
 
@@ -23,7 +25,7 @@ pub struct CacheResolution {
 
 impl CacheResolution {
     /// Resolution of short renders.
-    pub const COARSEST: Self = Self { strata: 16, error: 1e-4 };
+    pub const COARSEST: Self = Self { strata: 16, error: HESSIAN_ERROR };
 
     /// Resolutions from the finest on.
     const FINER: [Self; 3] = [
@@ -32,7 +34,7 @@ impl CacheResolution {
         Self { strata: 16, error: 3e-5 },
     ];
 
-    /// Resolution of a picture of so many `pixels` in `shards`, for each of which there is time for `rays`.
+    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel.
     pub fn of_budget(rays: f64, pixels: f64, shards: u32) -> Self {
         let affordable = |finer: &&Self| shards as f64 * finer.filling(pixels) <= FILLING * rays;
         Self::FINER.iter().find(affordable).copied().unwrap_or(Self::COARSEST)

@@ -30,6 +30,9 @@ pub enum Metric {
     Halflight,
 }
 
+/// Usual allowed error of the metrics by Hessians.
+pub const HESSIAN_ERROR: f32 = 1e-4;
+
 impl Metric {
     /// All metrics.
     pub const ALL: [Metric; 7] = [
@@ -128,7 +131,7 @@ impl Settings {
     /// Usual settings of `metric` in a scene of this `extent`: aspect up to 2 : 1, radii from 0 to a fifth of
     /// the extent.
     pub fn new(metric: Metric, extent: f32) -> Self {
-        let error = if metric.takes_distances() { 0.3 } else { 1e-4 };
+        let error = if metric.takes_distances() { 0.3 } else { HESSIAN_ERROR };
         Self {
             metric,
             error,

@@ -310,7 +310,7 @@ impl<'s> Sums<'s> {
             sum += inverse;
             largest = largest.max(inverse);
         }
-        // Of one stratum; a linear change between strata is no noise.
+        // The variance of one stratum; a linear change between strata is no noise.
         let [differences, count] = second_differences(samples.radiance, samples.n);
         let noise = differences / (6.0 * count);
         let gradient_variance = noise * weights.iter().map(|weight| weight.length_squared()).sum::<f32>();
