@@ -1,11 +1,11 @@
 //! Choice of a method by predicted error.
 //!
-//! A trial renders 16 tiles with four samples per pixel: by path tracing, and by path tracing in which an
-//! irradiance cache supplies the indirect light of diffuse surfaces. It measures the variance and the rays of
-//! both. The difference of the variances, divided by the gather rays of a record, is the noise of
-//! interpolated light; it includes the difference of the estimators of direct light. Work is counted in rays
-//! and not in seconds: the choice follows from scene, settings, seed, memory and, where time is limited, the
-//! number of threads.
+//! A trial renders 16 tiles with four samples per pixel: by path tracing, by path tracing in which an
+//! irradiance cache supplies the indirect light of diffuse surfaces, and by one in which records supply the
+//! light of rough lobes, too. It measures the variance and the rays of each. The difference of the variances,
+//! divided by the gather rays of a record, is the noise of interpolated light; it includes the difference of
+//! the estimators of direct light. Work is counted in rays and not in seconds: the choice follows from scene,
+//! settings, seed, memory and, where time is limited, the number of threads.
 
 use super::RenderContext;
 use super::cache_resolution::CacheResolution;
@@ -14,14 +14,16 @@ use super::counts::{self, LightPaths};
 use super::executor::{Executor, Passed};
 use crate::Rgb;
 use crate::bsdf::Features;
+use crate::cache::radiance::{LobeSettings, ServedLobes};
 use crate::estimate::RELMSE_OFFSET;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 use crate::findings::Decision::Used;
 use crate::findings::{Finding, Value};
-use crate::memory::{Footprint, OutOfMemory};
+use crate::memory::{Footprint, MemorySource, OutOfMemory};
+use crate::transport::cached::view;
 use crate::transport::path::reuse_pilot::PILOT_TILES;
 use crate::transport::path::{LightEstimator, WAVE};
-use crate::transport::{Counters, PathIntegrator, PathSettings};
+use crate::transport::{Counters, PathIntegrator, PathSettings, SuppliedLobes};
 
 /// Samples of a pixel in a trial.
 const SAMPLES: u32 = 4;
@@ -49,6 +51,12 @@ const RECORDS: f64 = 20.0;
 
 /// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
 const BIAS: f64 = 3e-4;
+
+/// Work of filling caches with records of lobes, relative to that without.
+const FILLING_OF_LOBES: f64 = 2.0;
+
+/// Least ratio of predicted errors for which records of lobes join an irradiance cache.
+const LEAST_GAIN_OF_LOBES: f64 = 1.2;
 
 /// Greatest fraction of the work for filling; radii grow if filling needs more.
 const FILLING: f64 = 0.44;
@@ -98,48 +106,72 @@ pub enum Best {
     Paths,
     /// An irradiance cache.
     Cache,
+    /// An irradiance cache with records of lobes.
+    RadianceCache,
     /// Light paths with the counts of a pilot.
     LightPaths,
 }
 
-/// Sums over a tile: of all light by path tracing, and of the light that no cache supplies.
+/// Light that records supply: none, that of diffuse surfaces, and that of lobes, too.
+const SUPPLIES: usize = 3;
+const IRRADIANCE: usize = 1;
+const RADIANCE: usize = 2;
+
+/// Sums over a tile, for each of [`SUPPLIES`]: of the light that no record supplies.
 #[derive(Clone, Copy, Default)]
 struct TileTrial {
     pixels: f64,
     /// Variance of the mean of the samples, relative to the light of pixel or block.
-    variance: [f64; 2],
-    rays: [f64; 2],
+    variance: [f64; SUPPLIES],
+    rays: [f64; SUPPLIES],
+}
+
+/// Caches that a trial predicts.
+#[derive(Clone, Copy, Debug)]
+pub struct TrialCaches {
+    /// Gather rays and density of the records.
+    pub resolution: CacheResolution,
+    /// Parts in which the picture is rendered, each with caches of its own.
+    pub shards: u32,
+    /// Lobes that records may serve.
+    pub lobes: LobeSettings,
 }
 
 impl TileTrial {
-    /// Adds a block of pixels of a picture with this `mean` radiance; `rest` are the same pixels without the
-    /// light of caches.
-    fn add(&mut self, all: &[Pixel], rest: &[Pixel], mean: f64) {
+    /// Adds a block of pixels of a picture with this `mean` radiance, for each of [`SUPPLIES`].
+    fn add(&mut self, [all, first, second]: [&[Pixel]; SUPPLIES], mean: f64) {
         let brightness = |light: Rgb| f64::from(light.element_sum()) / 3.0;
-        let sampled = || all.iter().zip(rest).filter(|(all, _)| all.count() > 0);
-        let pixels = sampled().count() as f64;
-        let level = sampled().map(|(all, _)| brightness(all.mean())).sum::<f64>() / pixels.max(1.0);
-        for (all, rest) in sampled() {
+        let of_all = all.iter().filter(|all| all.count() > 0);
+        let pixels = of_all.clone().count() as f64;
+        let level = of_all.map(|all| brightness(all.mean())).sum::<f64>() / pixels.max(1.0);
+        for ((all, first), second) in
+            all.iter().zip(first).zip(second).filter(|((all, _), _)| all.count() > 0)
+        {
             // A lamp is bright in both halves, a firefly in one.
             let least = brightness(all.even.mean()).min(brightness(all.odd.mean()));
             let own = level.max(least);
             let scale = own * own + RELMSE_OFFSET * mean * mean;
             if scale > 0.0 {
-                let variance = [all, rest].map(|pixel| brightness(pixel.variance()) / scale);
-                self.variance = [0, 1].map(|i| self.variance[i] + variance[i]);
+                let pixels = [all, first, second];
+                for (sum, pixel) in self.variance.iter_mut().zip(pixels) {
+                    *sum += brightness(pixel.variance()) / scale;
+                }
             }
         }
         self.pixels += pixels;
     }
 }
 
-/// Noise and work of samples of a picture, each of all light and of the light that records do not know.
+/// Noise and work of samples of a picture: of all light, of that which no irradiance cache supplies, and of
+/// that which no record supplies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Trial {
     /// Variance of a sample relative to the light of its pixel or block.
-    pub noise: [f64; 2],
+    pub noise: [f64; SUPPLIES],
     /// Rays of a sample.
-    pub work: [f64; 2],
+    pub work: [f64; SUPPLIES],
+    /// Whether records may serve lobes of the scene.
+    pub has_lobes: bool,
     /// Factor on noise × work by path reuse, or 1.
     pub reuse: f64,
     /// Pixels of the picture.
@@ -157,48 +189,67 @@ pub struct Trial {
 struct Predictions {
     paths: f64,
     cache: f64,
+    radiance_cache: f64,
     light_paths: f64,
 }
 
 /// Working memory of a worker.
 pub fn scratch<F: Features>() -> Footprint {
-    caustics::scratch::<F>().slice::<Pixel>(2 * PIXELS_PER_TILE)
+    caustics::scratch::<F>().slice::<Pixel>(SUPPLIES * PIXELS_PER_TILE)
 }
 
 impl Trial {
-    /// Trial of `paths`, joined with photons if they pay; a cache would have this `resolution`.
-    /// `None` where the executor is over.
+    /// Trial of `paths`, joined with photons if they pay, and of `caches`. `None` where the executor is over.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the scratch of the executor is smaller than [`scratch`].
-    pub fn run<F: Features>(
+    pub fn run<'m, F: Features>(
         context: &RenderContext,
         paths: &mut CausticPathTracing<F>,
-        (resolution, shards): (CacheResolution, u32),
+        caches: &TrialCaches,
+        memory: &mut impl MemorySource<'m>,
         executor: &mut impl Executor,
     ) -> Result<Option<Self>, OutOfMemory> {
-        // Samples that the picture does not have.
-        let settings = PathSettings { seed: !context.settings.seed, ..context.settings };
-        let all = RenderContext { settings, ..*context }.integrator::<F>();
-        let rest = all.without_cached_light();
-        let has_photons = paths.finding().used;
-        let (reuse, mean) = (paths.reuse(), f64::from(paths.mean_radiance(executor)?));
-        let tiles = match paths.photons() {
-            None => trace((&all, &rest), mean, executor)?,
-            Some(photons) => photons.lend(|photons| match photons {
-                Some(photons) => {
-                    trace((&all.with_caustics(photons), &rest.with_caustics(photons)), mean, executor)
-                }
-                None => trace((&all, &rest), mean, executor),
-            })??,
-        };
+        let tables = ServedLobes::footprint(context.scene);
+        // Lobes of a scene with little memory are left to paths.
+        let tables = if F::GLOSSY && memory.has(tables) { tables } else { Footprint::default() };
+        let (has_photons, reuse) = (paths.finding().used, paths.reuse());
+        let mean = f64::from(paths.mean_radiance(executor)?);
+        let (tiles, has_lobes) = memory.lend("lobes", tables, |_, arena| {
+            let wide = match tables.bytes() {
+                0 => None,
+                _ => ServedLobes::build(context.scene, &caches.lobes, arena)?,
+            };
+            let narrow = F::GLOSSY && view::may_serve(context.scene);
+            let supplied = SuppliedLobes { wide: wide.as_ref(), narrow };
+            let has_lobes = wide.is_some() || narrow;
+            // Samples that the picture does not have.
+            let settings = PathSettings { seed: !context.settings.seed, ..context.settings };
+            let all = RenderContext { settings, ..*context }.integrator::<F>();
+            let [first, second] =
+                [SuppliedLobes::default(), supplied].map(|lobes| all.without_cached_light(lobes));
+            let second = has_lobes.then_some(second);
+            let tiles = match paths.photons() {
+                None => trace(&all, (&first, second.as_ref()), mean, executor)?,
+                Some(photons) => photons.lend(|photons| match photons {
+                    Some(photons) => {
+                        let first = first.with_caustics(photons);
+                        let second = second.map(|second| second.with_caustics(photons));
+                        trace(&all.with_caustics(photons), (&first, second.as_ref()), mean, executor)
+                    }
+                    None => trace(&all, (&first, second.as_ref()), mean, executor),
+                })??,
+            };
+            Ok((tiles, has_lobes))
+        })?;
         let Some(tiles) = tiles else { return Ok(None) };
         let reuse = match reuse.pilot.filter(|_| reuse.used) {
             Some(pilot) => f64::from(pilot.cost()) / f64::from(pilot.gain()).min(counts::REUSE_GAIN),
             None => 1.0,
         };
-        let (pixels, shards) = (context.pixels() as f64, shards.into());
-        Ok(Some(Self { reuse, pixels, resolution, shards, has_photons, ..Self::of(&tiles) }))
+        let (pixels, shards) = (context.pixels() as f64, caches.shards.into());
+        let resolution = caches.resolution;
+        Ok(Some(Self { reuse, pixels, resolution, shards, has_photons, has_lobes, ..Self::of(&tiles) }))
     }
 
     /// Noise and work of `tiles`.
@@ -207,8 +258,8 @@ impl Trial {
         let pixels = tiles.iter().map(|tile| tile.pixels).sum::<f64>().max(1.0);
         let sum = |of: &dyn Fn(&TileTrial) -> f64| tiles.iter().map(of).sum::<f64>();
         Self {
-            noise: [0, 1].map(|i| samples * sum(&|tile| tile.variance[i]) / pixels),
-            work: [0, 1].map(|i| sum(&|tile| tile.rays[i]) / (samples * pixels)),
+            noise: core::array::from_fn(|i| samples * sum(&|tile| tile.variance[i]) / pixels),
+            work: core::array::from_fn(|i| sum(&|tile| tile.rays[i]) / (samples * pixels)),
             ..Self::default()
         }
     }
@@ -226,16 +277,17 @@ impl Trial {
         self.reuse * self.noise[0] * self.work[0] / work
     }
 
-    /// relMSE with an irradiance cache after so much work for each pixel. `rare` is the noise of paths by
-    /// rare light, as a factor on that of the trial.
-    pub fn error_of_cache(&self, work: f64, rare: f64) -> f64 {
-        let filling = self.shards * self.resolution.filling(self.pixels);
+    /// relMSE with a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
+    /// `rare` is the noise of paths by rare light, as a factor on that of the trial.
+    fn error_of_cache(&self, supply: usize, work: f64, rare: f64) -> f64 {
+        let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
+        let filling = of_lobes * self.shards * self.resolution.filling(self.pixels);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
         let record_rays = f64::from(self.resolution.strata * self.resolution.strata);
-        let gathered = (self.noise[0] - self.noise[1]).max(0.0) / (record_rays * RECORDS);
+        let gathered = (self.noise[0] - self.noise[supply]).max(0.0) / (record_rays * RECORDS);
         let bias = BIAS * f64::from(self.resolution.error / CacheResolution::COARSEST.error);
-        rare * self.noise[1] * CACHED_RAY * self.work[1] / left + wider * (rare * gathered + bias)
+        rare * self.noise[supply] * CACHED_RAY * self.work[supply] / left + wider * (rare * gathered + bias)
     }
 
     /// Errors after so much work for each pixel.
@@ -246,9 +298,15 @@ impl Trial {
             light_paths.and_then(|pilot| pilot.of_paths).map(|product| self.reuse * product / work);
         let factor = if self.has_photons { PHOTONS_FACTOR } else { 1.0 };
         let paths = (factor * of_trial).max(of_pilot.unwrap_or(0.0).min(ALL_IS_MISSING));
+        let rare = paths / of_trial;
+        let cache = |supply, is_choice| match is_choice {
+            true => self.error_of_cache(supply, work, rare),
+            false => f64::INFINITY,
+        };
         Predictions {
             paths,
-            cache: if may_have_cache { self.error_of_cache(work, paths / of_trial) } else { f64::INFINITY },
+            cache: cache(IRRADIANCE, may_have_cache),
+            radiance_cache: cache(RADIANCE, may_have_cache && self.has_lobes),
             light_paths: light_paths.map_or(f64::INFINITY, |pilot| LIGHT_PATHS_FACTOR * pilot.product / work),
         }
     }
@@ -269,14 +327,18 @@ impl Trial {
         if self.noise[0] <= 0.0 {
             return (Best::Paths, Finding::new("method", Used, "paths show no noise"));
         }
-        let Predictions { paths, cache, light_paths } =
+        let Predictions { paths, cache, radiance_cache, light_paths } =
             self.predict(self.budget(goal), may_have_cache, light_paths);
+        let cached = cache.min(radiance_cache);
         let (best, reason) = match () {
-            () if paths <= LEAST_GAIN * cache.min(light_paths) => {
+            () if paths <= LEAST_GAIN * cached.min(light_paths) => {
                 (Best::Paths, "path tracing has the least error")
             }
-            () if cache <= light_paths => {
+            () if cached <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
                 (Best::Cache, "an irradiance cache has less error than path tracing")
+            }
+            () if cached <= light_paths => {
+                (Best::RadianceCache, "records of rough reflections have less error than paths")
             }
             () => (Best::LightPaths, "light paths have less error than paths alone"),
         };
@@ -284,14 +346,18 @@ impl Trial {
         let finding = Finding::new("method", Used, reason)
             .with("path", Value::Number(paths))
             .with_some("irradiance_cache", number(cache))
+            .with_some("radiance_cache", number(radiance_cache))
             .with_some("light_paths", number(light_paths));
         (best, finding)
     }
 }
 
-/// Traces the tiles of a trial by both integrators, in a picture with this `mean` radiance.
+/// Traces the tiles of a trial in a picture with this `mean` radiance: by paths for all light, for that which
+/// no irradiance cache supplies, and for that which no record supplies; where no lobe is served, these are
+/// the same.
 fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
-    (all, rest): (&PathIntegrator<F, A>, &PathIntegrator<F, B>),
+    all: &PathIntegrator<F, A>,
+    (first, second): (&PathIntegrator<F, B>, Option<&PathIntegrator<F, B>>),
     mean: f64,
     executor: &mut impl Executor,
 ) -> Result<Option<[TileTrial; PILOT_TILES]>, OutOfMemory> {
@@ -299,15 +365,21 @@ fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
     let Passed { is_complete, .. } =
         executor.pass(all.pilot_tasks().zip(tiles.iter_mut()), |_, (tile, out), worker| {
             let mut arena = worker.scratch.scratch();
-            let pixels = arena.slice::<Pixel>(2 * PIXELS_PER_TILE)?;
+            let pixels = arena.slice::<Pixel>(SUPPLIES * PIXELS_PER_TILE)?;
             pixels.fill(Pixel::default());
-            let (of_all, of_rest) = pixels.split_at_mut(PIXELS_PER_TILE);
-            let counters = [
-                all.run(tile, 0..SAMPLES, WAVE, &mut arena, of_all)?,
-                rest.run(tile, 0..SAMPLES, WAVE, &mut arena, of_rest)?,
-            ];
-            out.rays = counters.map(|counters| counters.all_rays() as f64);
-            of_all.chunks(BLOCK).zip(of_rest.chunks(BLOCK)).for_each(|(all, rest)| out.add(all, rest, mean));
+            let (of_all, rest) = pixels.split_at_mut(PIXELS_PER_TILE);
+            let (of_first, of_second) = rest.split_at_mut(PIXELS_PER_TILE);
+            let samples = 0..SAMPLES;
+            out.rays[0] = all.run(tile, samples.clone(), WAVE, &mut arena, of_all)?.all_rays() as f64;
+            let rays = first.run(tile, samples.clone(), WAVE, &mut arena, of_first)?.all_rays() as f64;
+            out.rays[IRRADIANCE] = rays;
+            out.rays[RADIANCE] = match second {
+                Some(second) => second.run(tile, samples, WAVE, &mut arena, of_second)?.all_rays() as f64,
+                None => rays,
+            };
+            let of_second: &[Pixel] = if second.is_some() { of_second } else { of_first };
+            let blocks = of_all.chunks(BLOCK).zip(of_first.chunks(BLOCK)).zip(of_second.chunks(BLOCK));
+            blocks.for_each(|((all, first), second)| out.add([all, first, second], mean));
             Ok(Counters::default())
         })?;
     Ok(is_complete.then_some(tiles))

@@ -20,7 +20,7 @@ mod settings;
 mod walk;
 mod wavefront;
 
-pub use cached::lookup::CacheView;
+pub use cached::lookup::{CacheView, SuppliedLobes};
 pub use caustics::merge::CausticMerging;
 pub use path::reuse_pilot::Pilot;
 pub use path::{LightEstimator, PathIntegrator, PathReuse, Sharing};

@@ -43,6 +43,15 @@ pub struct CachedLight {
     view: Option<Rgb>,
 }
 
+/// Lobes whose light records supply beside the irradiance.
+#[derive(Clone, Copy, Default)]
+pub struct SuppliedLobes<'a> {
+    /// Lobes of records with coefficients.
+    pub wide: Option<&'a ServedLobes<'a>>,
+    /// True if view-bound records serve narrow lobes that the camera sees.
+    pub narrow: bool,
+}
+
 /// Irradiance caches that paths look up.
 #[derive(Clone, Copy)]
 pub enum CacheView<'a> {
@@ -50,9 +59,9 @@ pub enum CacheView<'a> {
     Pair([&'a IrradianceCache<'a>; 2]),
     /// The same, with view-bound records of even and of odd samples.
     WithViews([&'a IrradianceCache<'a>; 2], [&'a ViewRecords<'a>; 2]),
-    /// A cache that is valid at every point and returns zero: paths then find the light that no cache
+    /// Records that are valid at every point and return zero: paths then find the light that no record
     /// supplies.
-    Everywhere,
+    Everywhere(SuppliedLobes<'a>),
     /// One cache with its present records. The first valid record is enough for gather rays, which are
     /// averaged.
     UnderConstruction(&'a IrradianceCache<'a>),
@@ -65,8 +74,13 @@ impl CacheView<'_> {
             CacheView::Pair([cache, _])
             | CacheView::WithViews([cache, _], _)
             | CacheView::UnderConstruction(cache) => cache.coefficients().map(RecordCoefficients::lobes),
-            CacheView::Everywhere => None,
+            CacheView::Everywhere(supplied) => supplied.wide,
         }
+    }
+
+    /// True if view-bound records may supply light.
+    fn has_views(&self) -> bool {
+        matches!(self, CacheView::WithViews(..) | CacheView::Everywhere(SuppliedLobes { narrow: true, .. }))
     }
 
     /// Radiance that the lobe at `point` reflects in the direction `viewer`, if it is served and a valid
@@ -87,7 +101,7 @@ impl CacheView<'_> {
                 caches[sample as usize & 1].reflected(context.level, query, &viewer, false)
             }
             CacheView::UnderConstruction(cache) => cache.reflected(context.level, query, &viewer, true),
-            CacheView::Everywhere => None,
+            CacheView::Everywhere(_) => Some(Rgb::ZERO),
         }
     }
 
@@ -113,7 +127,7 @@ impl CacheView<'_> {
                     exposed.iter_mut().zip(reach).for_each(|(exposed, reach)| *exposed = exposed.max(reach));
                 }
             }
-            CacheView::Everywhere => {
+            CacheView::Everywhere(_) => {
                 let known = CachedIrradiance { irradiance: Rgb::ZERO, edge_moment: Rgb::ZERO, shining: 0.0 };
                 queries.for_each(|(i, _)| found[i] = Some(known));
             }
@@ -154,7 +168,9 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {
         match self {
             // With cut-outs each path has memory for one shadow ray.
-            CacheView::Pair(_) | CacheView::WithViews(..) | CacheView::Everywhere if !context.has_cutouts => {
+            CacheView::Pair(_) | CacheView::WithViews(..) | CacheView::Everywhere(_)
+                if !context.has_cutouts =>
+            {
                 LIGHT_SAMPLES
             }
             _ => 1,
@@ -209,12 +225,15 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
                 }
             }
         }
-        if F::GLOSSY
-            && let CacheView::WithViews(_, views) = self
-        {
+        if F::GLOSSY && self.has_views() {
             for ((found, point), i) in found.iter_mut().zip(points).zip(range) {
                 if let Some(point) = point.as_ref().filter(|_| found.lobe.is_none()) {
-                    found.view = view::reflected((context, settings), views, (wave, i), point);
+                    found.view = match self {
+                        CacheView::WithViews(_, views) => {
+                            view::reflected((context, settings), views, (wave, i), point)
+                        }
+                        _ => view::is_seen((context, settings), (wave, i), point).then_some(Rgb::ZERO),
+                    };
                 }
             }
         }
@@ -289,9 +308,9 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         self.with_estimator(CacheView::WithViews(caches, views))
     }
 
-    /// This path tracer without the light that a complete cache would supply.
-    pub fn without_cached_light(&self) -> PathIntegrator<'a, F, CacheView<'a>> {
-        self.with_estimator(CacheView::Everywhere)
+    /// This path tracer without the light that complete caches would supply, of irradiance and of `lobes`.
+    pub fn without_cached_light<'b>(&self, lobes: SuppliedLobes<'b>) -> PathIntegrator<'a, F, CacheView<'b>> {
+        self.with_estimator(CacheView::Everywhere(lobes))
     }
 
     /// This path tracer for gather rays, with the records that `cache` has so far.

@@ -95,22 +95,42 @@ fn viewed_lobe<F: Features>(
     is_served.then_some((bsdf, lobe, kind))
 }
 
-/// Radiance that the lobe at `point` reflects to the camera, if view-bound records serve it: `point` is the
-/// hit of ray `ray` of the wave.
-pub(in crate::transport) fn reflected<F: Features>(
+/// Lobe at `point`, the hit of ray `ray` of the wave, its kind, and the sample number of its path, if
+/// view-bound records serve it.
+fn seen_lobe<F: Features>(
     (context, settings): (&SceneContext<F>, &PathSettings),
-    views: &[&ViewRecords; 2],
     (wave, ray): (&Wavefront, usize),
     point: &SurfacePoint,
-) -> Option<Rgb> {
+) -> Option<(ViewedLobe, LobeKind, u32)> {
     let ray = wave.rays.get(ray)?;
     let path = wave.paths.get(ray.tag as usize)?;
     if path.segments != 1 || !path.classes.has_rough() || settings.max_depth <= 1 {
         return None;
     }
     let (_, lobe, kind) = viewed_lobe(context, point, ray.direction.into())?;
+    Some((lobe, kind, path.sample))
+}
+
+/// True if view-bound records serve the lobe at `point`, the hit of ray `ray` of the wave.
+pub(in crate::transport) fn is_seen<F: Features>(
+    of: (&SceneContext<F>, &PathSettings),
+    ray: (&Wavefront, usize),
+    point: &SurfacePoint,
+) -> bool {
+    seen_lobe(of, ray, point).is_some()
+}
+
+/// Radiance that the lobe at `point` reflects to the camera, if view-bound records serve it: `point` is the
+/// hit of ray `ray` of the wave.
+pub(in crate::transport) fn reflected<F: Features>(
+    of: (&SceneContext<F>, &PathSettings),
+    views: &[&ViewRecords; 2],
+    ray: (&Wavefront, usize),
+    point: &SurfacePoint,
+) -> Option<Rgb> {
+    let (lobe, kind, sample) = seen_lobe(of, ray, point)?;
     let query = QueryPoint::open(point.position, point.frame.normal);
-    let radiance = views[path.sample as usize & 1].at(&query, &kind)?;
+    let radiance = views[sample as usize & 1].at(&query, &kind)?;
     Some(radiance * lobe.reflectance())
 }
 

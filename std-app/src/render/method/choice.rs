@@ -10,7 +10,7 @@ use halflight_core::census::Census;
 use halflight_core::findings::Finding;
 use halflight_core::method::Method as _;
 use halflight_core::method::caustics::CausticPathTracing;
-use halflight_core::method::choice::{Best, Trial};
+use halflight_core::method::choice::{Best, Trial, TrialCaches};
 
 /// Outcome of a choice: the plan of another method, and the reason.
 pub(super) struct Chosen<'a, F> {
@@ -30,8 +30,9 @@ pub(super) fn choose<'a, F: Features>(
     if !goal.affords_trial(context.pixels()) {
         return Ok(None);
     }
-    let records = (settings.cache.resolution(), settings.shard.count);
-    let Some(trial) = Trial::run(&context, paths, records, executor)? else { return Ok(None) };
+    let (resolution, shards) = (settings.cache.resolution(), settings.shard.count);
+    let caches = TrialCaches { resolution, shards, lobes: settings.lobes };
+    let Some(trial) = Trial::run(&context, paths, &caches, memory, executor)? else { return Ok(None) };
     let is_audited = settings.audit.is_none_or(|share| share > 0.0);
     let light_paths = match trial.affords_light_paths(&goal) {
         true => bidirectional::choose::<F>(setup, memory, &settings.bidirectional)?,
@@ -47,6 +48,7 @@ pub(super) fn choose<'a, F: Features>(
     let instead = match (best, light_paths) {
         (Best::Paths, _) | (Best::LightPaths, None) => None,
         (Best::Cache, _) => Some(Method::IrradianceCache.into()),
+        (Best::RadianceCache, _) => Some(Method::RadianceCache.into()),
         (Best::LightPaths, Some(choice)) => {
             let method = if choice.counts.merging { Method::VertexMerging } else { Method::Bidirectional };
             Some(Plan::with_counts(method, choice))
