@@ -12,7 +12,7 @@ use halflight_core::findings::Value;
 use halflight_core::scene::{Camera, Material};
 use halflight_simd::Level;
 use halflight_tests::render::{number, render};
-use halflight_tests::scenes::{SceneBuffers, emitter};
+use halflight_tests::scenes::{SceneBuffers, box_from_above, emitter, metal};
 use std::fs;
 use std::path::Path;
 
@@ -60,6 +60,19 @@ fn a_cache_is_chosen_where_indirect_light_is_most_of_the_noise() {
     assert!(result.audit.is_some(), "its bias is measured");
     let audited_by_nobody = chosen(&room, |settings| settings.audit = Some(0.0));
     assert_eq!(audited_by_nobody.method, Method::Path);
+}
+
+#[test]
+fn records_of_lobes_are_chosen_where_rough_reflections_are_most_of_the_noise() {
+    // Wide lobes, and narrow ones that the camera sees.
+    for roughness in [0.55, 0.4] {
+        let surface = metal(roughness);
+        let result = chosen(&box_from_above(surface, surface), |settings| settings.stop.spp = Some(64));
+        assert_eq!(result.method, Method::RadianceCache, "roughness {roughness}");
+        let [irradiance, radiance] =
+            ["irradiance_cache", "radiance_cache"].map(|method| number(&result, "method", method));
+        assert!(irradiance > 2.0 * radiance && radiance > 0.0, "{irradiance} {radiance}");
+    }
 }
 
 #[test]
@@ -168,7 +181,7 @@ fn choices() -> String {
                 };
                 let result = render::render(scene, &settings, &mut stop_render, &stopped).expect("a picture");
                 text += &format!("{:>5} spp {:<16}", spp, result.method.name());
-                for method in ["path", "irradiance_cache", "light_paths"] {
+                for method in ["path", "irradiance_cache", "radiance_cache", "light_paths"] {
                     let predicted = result.findings.get("method").and_then(|finding| finding.number(method));
                     text += &predicted.map_or("  -      ".into(), |error| format!("  {error:.1e}"));
                 }

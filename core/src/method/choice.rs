@@ -43,26 +43,18 @@ const FEWEST_SAMPLES: f64 = 4.0;
 const PILOT_RAYS: f64 = 5e5;
 const PILOT_SHARE: f64 = 0.08;
 
-/// Work of a ray of cached paths, with its share of lookups and light samples.
-const CACHED_RAY: f64 = 1.8;
-
-/// Records whose mean a lookup returns.
-const RECORDS: f64 = 20.0;
+/// Gather rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in
+/// records.
+const RECORDS: f64 = 40.0;
 
 /// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
 const BIAS: f64 = 3e-4;
-
-/// Work of filling caches with records of lobes, relative to that without.
-const FILLING_OF_LOBES: f64 = 2.0;
-
-/// Least ratio of predicted errors for which records of lobes join an irradiance cache.
-const LEAST_GAIN_OF_LOBES: f64 = 1.2;
 
 /// Greatest fraction of the work for filling; radii grow if filling needs more.
 const FILLING: f64 = 0.44;
 
 /// Factor on the predicted error of light paths: their rays take more time.
-const LIGHT_PATHS_FACTOR: f64 = 1.5;
+const LIGHT_PATHS_FACTOR: f64 = 2.0;
 
 /// Factor on the predicted errors of path tracing and of a cache with caustic photons: light paths, density
 /// estimates, and noise that sixteen samples of a block do not show.
@@ -72,7 +64,7 @@ const PHOTONS_FACTOR: f64 = 6.0;
 const ALL_IS_MISSING: f64 = 1.0;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
-const LEAST_GAIN: f64 = 1.4;
+const LEAST_GAIN: f64 = 1.1;
 
 /// End of a picture: the first of these that holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -280,14 +272,13 @@ impl Trial {
     /// relMSE with a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
     /// `rare` is the noise of paths by rare light, as a factor on that of the trial.
     fn error_of_cache(&self, supply: usize, work: f64, rare: f64) -> f64 {
-        let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
-        let filling = of_lobes * self.shards * self.resolution.filling(self.pixels);
+        let filling = self.shards * self.resolution.filling(self.pixels);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
         let record_rays = f64::from(self.resolution.strata * self.resolution.strata);
         let gathered = (self.noise[0] - self.noise[supply]).max(0.0) / (record_rays * RECORDS);
         let bias = BIAS * f64::from(self.resolution.error / CacheResolution::COARSEST.error);
-        rare * self.noise[supply] * CACHED_RAY * self.work[supply] / left + wider * (rare * gathered + bias)
+        rare * self.noise[supply] * self.work[supply] / left + wider * (rare * gathered + bias)
     }
 
     /// Errors after so much work for each pixel.
@@ -334,7 +325,7 @@ impl Trial {
             () if paths <= LEAST_GAIN * cached.min(light_paths) => {
                 (Best::Paths, "path tracing has the least error")
             }
-            () if cached <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
+            () if cached <= light_paths && cache <= radiance_cache => {
                 (Best::Cache, "an irradiance cache has less error than path tracing")
             }
             () if cached <= light_paths => {
