@@ -1,6 +1,7 @@
 //! Resolution of an irradiance cache by the work of its picture: more gather rays for each record, and more
 //! records, where their gathering is a part of the work.
 
+use super::work_of_detail;
 use crate::cache::irradiance::metric::HESSIAN_ERROR;
 
 /// Work of a gather ray, in rays of paths.
@@ -34,19 +35,21 @@ impl CacheResolution {
         Self { strata: 16, error: 3e-5 },
     ];
 
-    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel.
-    pub fn of_budget(rays: f64, pixels: f64, shards: u32) -> Self {
-        let affordable = |finer: &&Self| shards as f64 * finer.filling(pixels) <= FILLING * rays;
+    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel, in a
+    /// scene of so many `triangles`.
+    pub fn of_budget(rays: f64, (pixels, triangles): (f64, usize), shards: u32) -> Self {
+        let affordable = |finer: &&Self| shards as f64 * finer.filling(pixels, triangles) <= FILLING * rays;
         Self::FINER.iter().find(affordable).copied().unwrap_or(Self::COARSEST)
     }
 
-    /// Work of filling for each of `pixels` pixels, in rays of paths.
-    pub fn filling(&self, pixels: f64) -> f64 {
+    /// Work of filling for each of `pixels` pixels, in rays of paths, in a scene of so many `triangles`.
+    pub fn filling(&self, pixels: f64, triangles: usize) -> f64 {
         let relative = |of: fn(&Self) -> f64| of(self) / of(&Self::COARSEST);
         let rays = relative(|resolution| f64::from(resolution.strata * resolution.strata));
         // Errors grow with the fourth power of radii.
         let records = 1.0 / libm::sqrt(relative(|resolution| resolution.error.into()));
-        GATHER_RAY * GATHER_RAYS * rays * records * libm::pow(pixels, -GATHER_POWER)
+        let coarsest = GATHER_RAY * GATHER_RAYS * libm::pow(pixels, -GATHER_POWER);
+        coarsest * rays * records * work_of_detail(triangles)
     }
 }
 
@@ -63,14 +66,17 @@ mod tests {
     #[test]
     fn longer_renders_have_finer_caches_within_a_part_of_the_work() {
         let pixels = 16384.0;
-        let mut last = CacheResolution::COARSEST.filling(pixels);
+        let of = |rays, shards| CacheResolution::of_budget(rays, (pixels, 36), shards);
+        let mut last = CacheResolution::COARSEST.filling(pixels, 36);
         for rays in [10.0, 100.0, 1e3, 3e3, 1e4, 1e5] {
-            let chosen = CacheResolution::of_budget(rays, pixels, 1);
-            let filling = chosen.filling(pixels);
+            let chosen = of(rays, 1);
+            let filling = chosen.filling(pixels, 36);
             assert!(filling >= last && (chosen == CacheResolution::COARSEST || filling <= FILLING * rays));
             last = filling;
         }
-        assert_eq!(CacheResolution::of_budget(1e5, pixels, 1), CacheResolution::FINER[0]);
-        assert_eq!(CacheResolution::of_budget(1e3, pixels, 8), CacheResolution::COARSEST);
+        assert_eq!(of(1e5, 1), CacheResolution::FINER[0]);
+        assert_eq!(of(1e3, 8), CacheResolution::COARSEST);
+        let detailed = CacheResolution::of_budget(1e4, (pixels, 1 << 20), 1);
+        assert!(of(1e4, 1).strata > detailed.strata, "more detail takes more records");
     }
 }

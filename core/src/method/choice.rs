@@ -7,11 +7,11 @@
 //! the estimators of direct light. Work is counted in rays and not in seconds: the choice follows from scene,
 //! settings, seed, memory and, where time is limited, the number of threads.
 
-use super::RenderContext;
 use super::cache_resolution::CacheResolution;
 use super::caustics::{self, CausticPathTracing};
 use super::counts::{self, LightPaths};
 use super::executor::{Executor, Passed};
+use super::{RenderContext, work_of_detail};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::cache::radiance::{LobeSettings, ServedLobes};
@@ -43,12 +43,19 @@ const FEWEST_SAMPLES: f64 = 4.0;
 const PILOT_RAYS: f64 = 5e5;
 const PILOT_SHARE: f64 = 0.08;
 
+/// Work of a ray of cached paths in a scene of few triangles, with its share of look-ups. Beside it stands that
+/// noise of light samples falls faster than with the inverse of their number.
+const CACHED_RAY: f64 = 0.8;
+
 /// Gather rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in
 /// records.
 const RECORDS: f64 = 40.0;
 
 /// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
 const BIAS: f64 = 3e-4;
+
+/// Least ratio of predicted errors for which records of lobes join an irradiance cache: they take more rays.
+const LEAST_GAIN_OF_LOBES: f64 = 1.1;
 
 /// Greatest fraction of the work for filling; radii grow if filling needs more.
 const FILLING: f64 = 0.44;
@@ -168,6 +175,8 @@ pub struct Trial {
     pub reuse: f64,
     /// Pixels of the picture.
     pub pixels: f64,
+    /// Triangles of the scene.
+    pub triangles: usize,
     /// Gather rays and density of the records.
     pub resolution: CacheResolution,
     /// Parts in which the picture is rendered, each with caches of its own.
@@ -240,8 +249,9 @@ impl Trial {
             None => 1.0,
         };
         let (pixels, shards) = (context.pixels() as f64, caches.shards.into());
-        let resolution = caches.resolution;
-        Ok(Some(Self { reuse, pixels, resolution, shards, has_photons, has_lobes, ..Self::of(&tiles) }))
+        let (triangles, resolution) = (context.scene.mesh.triangles.len(), caches.resolution);
+        let trial = Self { reuse, pixels, triangles, resolution, shards, ..Self::of(&tiles) };
+        Ok(Some(Self { has_photons, has_lobes, ..trial }))
     }
 
     /// Noise and work of `tiles`.
@@ -272,13 +282,14 @@ impl Trial {
     /// relMSE with a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
     /// `rare` is the noise of paths by rare light, as a factor on that of the trial.
     fn error_of_cache(&self, supply: usize, work: f64, rare: f64) -> f64 {
-        let filling = self.shards * self.resolution.filling(self.pixels);
+        let filling = self.shards * self.resolution.filling(self.pixels, self.triangles);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
         let record_rays = f64::from(self.resolution.strata * self.resolution.strata);
         let gathered = (self.noise[0] - self.noise[supply]).max(0.0) / (record_rays * RECORDS);
         let bias = BIAS * f64::from(self.resolution.error / CacheResolution::COARSEST.error);
-        rare * self.noise[supply] * self.work[supply] / left + wider * (rare * gathered + bias)
+        let cached_ray = CACHED_RAY * work_of_detail(self.triangles);
+        rare * self.noise[supply] * cached_ray * self.work[supply] / left + wider * (rare * gathered + bias)
     }
 
     /// Errors after so much work for each pixel.
@@ -325,7 +336,7 @@ impl Trial {
             () if paths <= LEAST_GAIN * cached.min(light_paths) => {
                 (Best::Paths, "path tracing has the least error")
             }
-            () if cached <= light_paths && cache <= radiance_cache => {
+            () if cached <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
                 (Best::Cache, "an irradiance cache has less error than path tracing")
             }
             () if cached <= light_paths => {

@@ -29,8 +29,19 @@ mod splats;
 pub mod sppm;
 pub mod view_placement;
 
-/// Rays per second and thread by which a time limit becomes work. No clock is read.
-pub const RAYS_PER_SECOND: f64 = 6e6;
+/// Rays per second and thread in a scene of few triangles. No clock is read.
+const RAYS_PER_SECOND: f64 = 6e6;
+
+/// Work in a scene of so many `triangles` relative to that in a scene of few: its hierarchy is deeper, and its
+/// surfaces have more detail. By seconds, measured on 24 scenes of 36 to 383,000 triangles.
+pub fn work_of_detail(triangles: usize) -> f64 {
+    1.0 + 0.25 * libm::log2(1.0 + triangles as f64 / 4096.0)
+}
+
+/// Rays per second and thread by which a time limit becomes work in a scene of so many `triangles`.
+pub fn rays_per_second(triangles: usize) -> f64 {
+    RAYS_PER_SECOND / work_of_detail(triangles)
+}
 
 pub use executor::{Executor, Loop, Passed, Worker};
 pub use photon_map_store::{PhotonMapPair, PhotonMapStore};

@@ -111,7 +111,7 @@ impl WithFeatures for Render<'_> {
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
         let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let affords_pilots = method != Method::Path || plain.goal().affords_pilots(pixels);
-        let within_time = within_time(settings, &plain.goal(), affords_pilots);
+        let within_time = within_time(settings, &plain.goal(), scene.mesh.triangles.len(), affords_pilots);
         let settings = &within_time;
         let plain = RenderSetup { settings, ..plain };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
@@ -191,9 +191,9 @@ fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
     is_lost && has_time && settings.shard == Shard::WHOLE
 }
 
-/// Settings that suit the time of the picture: paths without the structures that a pilot chooses where it
+/// Settings that suit the time of the picture of a scene of so many `triangles`: paths without the structures that a pilot chooses where it
 /// suffices for a few samples of each pixel, and finer caches where it alone ends the picture.
-fn within_time(settings: &Settings, goal: &Goal, affords_pilots: bool) -> Settings {
+fn within_time(settings: &Settings, goal: &Goal, triangles: usize, affords_pilots: bool) -> Settings {
     let mut own = settings.clone();
     if !affords_pilots {
         own.caustics = false;
@@ -205,7 +205,8 @@ fn within_time(settings: &Settings, goal: &Goal, affords_pilots: bool) -> Settin
         && !has_file
     {
         let pixels = f64::from(settings.width) * f64::from(settings.height);
-        own.cache = own.cache.with(CacheResolution::of_budget(rays / pixels, pixels, settings.shard.count));
+        let resolution = CacheResolution::of_budget(rays / pixels, (pixels, triangles), settings.shard.count);
+        own.cache = own.cache.with(resolution);
     }
     own
 }

@@ -9,6 +9,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::census::Census;
 use halflight_core::findings::Finding;
 use halflight_core::method::Method as _;
+use halflight_core::method::bidirectional::BidirectionalSettings;
 use halflight_core::method::caustics::CausticPathTracing;
 use halflight_core::method::choice::{Best, Trial, TrialCaches};
 
@@ -33,14 +34,17 @@ pub(super) fn choose<'a, F: Features>(
     let (resolution, shards) = (settings.cache.resolution(), settings.shard.count);
     let caches = TrialCaches { resolution, shards, lobes: settings.lobes };
     let Some(trial) = Trial::run(&context, paths, &caches, memory, executor)? else { return Ok(None) };
+    // Photons of paths and caches have the light of merges, and no blur that lasts as long as the picture.
+    let merging = settings.bidirectional.merging.or(Some(false));
+    let techniques = BidirectionalSettings { merging, ..settings.bidirectional };
     let is_audited = settings.audit.is_none_or(|share| share > 0.0);
     let light_paths = match trial.affords_light_paths(&goal) {
-        true => bidirectional::choose::<F>(setup, memory, &settings.bidirectional)?,
+        true => bidirectional::choose::<F>(setup, memory, &techniques)?,
         false => None,
     };
+    let findings = paths.findings();
     // Merges are biased, as caches are.
     let light_paths = light_paths.filter(|choice| is_audited || !choice.counts.merging);
-    let findings = paths.findings();
     let products = light_paths.and_then(|choice| choice.products(&findings));
     let light_paths = light_paths.map(|choice| choice.beside(&findings));
     let products = products.filter(|_| light_paths.is_some_and(|choice| choice.counts.light_paths > 0.0));

@@ -42,7 +42,7 @@ use halflight_core::method::instant_radiosity::InstantRadiosity;
 use halflight_core::method::metropolis::Metropolis;
 use halflight_core::method::photon_map::PhotonMapping;
 use halflight_core::method::sppm::ProgressivePhotonMapping;
-use halflight_core::method::{Method as CoreMethod, RAYS_PER_SECOND, RenderContext};
+use halflight_core::method::{Method as CoreMethod, RenderContext, rays_per_second};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
 use prepared::Prepared;
@@ -177,7 +177,8 @@ impl<'a> RenderSetup<'a> {
     /// Rays that the time of the picture allows, if it is limited.
     pub(super) fn most_rays(&self) -> Option<f64> {
         let seconds = self.settings.stop.seconds?;
-        Some(seconds * self.workers.count() as f64 * RAYS_PER_SECOND)
+        let rays = rays_per_second(self.scene.mesh.triangles.len());
+        Some(seconds * self.workers.count() as f64 * rays)
     }
 
     /// End of the picture.
