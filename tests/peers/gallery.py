@@ -1,9 +1,9 @@
-"""Pictures and error curves of nine methods on three scenes of the repository, for docs/methods.md.
+"""Pictures and error curves of all methods on four scenes of the repository, for docs/methods.md.
 
     HALFLIGHT=program python3 tests/peers/gallery.py [--seconds 8] [--reference-seconds 240]
 
-Writes docs/gallery/methods-SCENE.png, nine pictures in three rows after the same time, in the order of METHODS,
-and methods-SCENE.svg, relMSE against seconds. References are long pictures of another seed. Needs numpy.
+Writes docs/gallery/methods-SCENE.png, three rows of pictures after the same time, in the order of METHODS, and
+methods-SCENE.svg, relMSE against seconds. References are long pictures of another seed. Needs numpy.
 """
 
 import argparse
@@ -24,10 +24,12 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PROGRAM = os.environ.get("HALFLIGHT", str(ROOT / "target" / "release" / "halflight"))
 GALLERY = ROOT / "docs" / "gallery"
 KEPT = ROOT / "tests" / "output" / "gallery"
-METHODS = ["path", "irradiance-cache", "photon-map", "sppm", "light", "bdpt", "vcm", "instant-radiosity", "mlt"]
-COLOURS = ["#000", "#d00", "#a60", "#e80", "#0a0", "#06c", "#60c", "#888", "#c0a"]
+METHODS = ["path", "irradiance-cache", "radiance-cache", "photon-map", "sppm", "light", "bdpt", "vcm", "instant-radiosity",
+           "mlt", "auto"]
+COLOURS = ["#000", "#d00", "#f77", "#a60", "#e80", "#0a0", "#06c", "#60c", "#888", "#c0a", "#0aa"]
+COLUMNS = 4
 SCENES = {"cornell": ("scenes/cornell/cornell.obj", "path"), "two-rooms": ("scenes/two-rooms/two-rooms.toml", "bdpt"),
-          "caustic": ("scenes/caustic/caustic.toml", "path")}
+          "caustic": ("scenes/caustic/caustic.toml", "path"), "glossy": ("scenes/glossy/glossy.toml", "path")}
 SIDE = 192
 
 
@@ -102,7 +104,8 @@ def main():
                 if not curves[method]:
                     raise RuntimeError(f"{name} {method}: no point of the curve")
                 print(f"{name} {method}: relMSE {curves[method][-1][1]:.2e}", flush=True)
-        picture = np.vstack([np.hstack(rows[i : i + 3]) for i in (0, 3, 6)])
+        rows += [np.zeros_like(rows[0])] * (-len(rows) % COLUMNS)
+        picture = np.vstack([np.hstack(rows[i : i + COLUMNS]) for i in range(0, len(rows), COLUMNS)])
         write_png(GALLERY / f"methods-{name}.png", exposure * picture)
         write_curves(GALLERY / f"methods-{name}.svg", curves)
 
