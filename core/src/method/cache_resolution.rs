@@ -13,7 +13,7 @@ const GATHER_RAYS: f64 = 5700.0;
 const GATHER_POWER: f64 = 0.4;
 
 /// Greatest fraction of the work for a finer cache.
-const FILLING: f64 = 0.35;
+const FILLING: f64 = 0.4;
 
 /// Gather rays of a record, and the density of records.
 #[derive(Clone, Copy, Debug, PartialEq)]

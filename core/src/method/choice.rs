@@ -71,7 +71,7 @@ const PHOTONS_FACTOR: f64 = 6.0;
 const ALL_IS_MISSING: f64 = 1.0;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
-const LEAST_GAIN: f64 = 1.1;
+const LEAST_GAIN: f64 = 1.15;
 
 /// End of a picture: the first of these that holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
