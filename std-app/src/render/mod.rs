@@ -45,7 +45,7 @@ pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
-pub use method::{CacheSettings, LobeSettings, MapView, Method, PhotonSettings, PhotonView};
+pub use method::{Basis, CacheSettings, LobeSettings, MapView, Method, PhotonSettings, PhotonView};
 pub use radiance_study::{ALPHAS, BasisError, GradientError, study_bases, study_gradients};
 pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
