@@ -120,7 +120,8 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
     let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(1, representation).bytes() / 64];
     let pool = CoefficientPool::new(1, representation, &mut Arena::over(&mut lines));
     let mut pool = pool.expect("the footprint is enough");
-    let record = pool.push(&Expansion::zernike(&light, &derivatives.gradients), unit).expect("memory for one record");
+    let record =
+        pool.push(&Expansion::zernike(&light, &derivatives.gradients), unit).expect("memory for one record");
     let weights = Weights::new(&light.values[1][..zernike::count(degree)]);
     let reflected = pool.reflected(Level::BASELINE, &record, &weights, delta).to_array();
     for level in Level::detect().and_below() {
@@ -140,16 +141,19 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
 /// gradients, rotations and any order do not panic.
 fn harmonics((n, order): (usize, usize), hemisphere: &Hemisphere, input: &mut Unstructured) -> Result<()> {
     let mut lines = vec![Line([0; 64]); sh::ShTables::footprint(n, order).bytes() / 64];
-    let tables = sh::ShTables::build(n, order, &mut Arena::over(&mut lines)).expect("the footprint is enough");
+    let tables =
+        sh::ShTables::build(n, order, &mut Arena::over(&mut lines)).expect("the footprint is enough");
     let _ = sh::displaced(&tables, hemisphere, coordinate(input)?);
     let gradients = sh::unoccluded(&tables, hemisphere).expect("normals");
     let light = sh::ShCoefficients::project(Level::BASELINE, &tables, hemisphere).expect("tables of n");
     let representation = Representation { basis: Basis::SphericalHarmonics, degree: order };
     let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(1, representation).bytes() / 64];
-    let mut pool = CoefficientPool::new(1, representation, &mut Arena::over(&mut lines)).expect("the footprint");
+    let mut pool =
+        CoefficientPool::new(1, representation, &mut Arena::over(&mut lines)).expect("the footprint");
     let record = pool.push(&Expansion::spherical_harmonics(&light, &gradients), coordinate(input)?);
     let record = record.expect("memory for one record");
-    let turned = sh::ShRotation::new(&Mat3::from_rotation_y(coordinate(input)?), order).apply(&light.values[0]);
+    let turned =
+        sh::ShRotation::new(&Mat3::from_rotation_y(coordinate(input)?), order).apply(&light.values[0]);
     // Orders of lobes may be lower than that of the record.
     let weights = Weights::new(&turned[..sh::count(input.int_in_range(0..=order)?)]);
     let delta = Vec2::new(coordinate(input)?, coordinate(input)?);

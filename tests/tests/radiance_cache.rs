@@ -1,10 +1,11 @@
 //! Radiance caching against path tracing in a box with rough reflections, and its difference from irradiance
 //! caching.
 
-use halflight::render::{Basis, LobeSettings, Method, RenderResult, Settings};
+use halflight::render::{Basis, Checkpoint, LobeSettings, Method, RenderResult, Settings};
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::findings::Decision;
 use halflight_core::scene::Material;
+use halflight_simd::Level;
 use halflight_tests::agreement::Agreement;
 use halflight_tests::render::{finding, number, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, metal, rough_box};
@@ -96,4 +97,34 @@ fn a_loaded_cache_gives_the_same_picture_and_others_are_refused() {
     let loaded = with(radiance, Some(&file), None, harmonics).unwrap();
     assert!(saved.image == loaded.image && records(&saved) == records(&loaded));
     std::fs::remove_file(file).unwrap();
+}
+
+#[test]
+fn bits_of_harmonics_do_not_depend_on_threads_or_level() {
+    let buffers = rough_box();
+    let with = |threads, level| {
+        let result = cached(&buffers, |settings| {
+            harmonics(settings);
+            (settings.threads, settings.level) = (Some(threads), level);
+        });
+        result.image
+    };
+    let one = with(1, Level::BASELINE);
+    for level in Level::detect().and_below() {
+        assert!(with(2, level) == one, "{}", level.name());
+    }
+}
+
+#[test]
+fn a_film_of_one_basis_is_not_resumed_with_another() {
+    let (buffers, film) = (rough_box(), path("film"));
+    let keep = Checkpoint { path: film.clone(), every: f64::INFINITY };
+    cached(&buffers, |settings| settings.checkpoint = Some(keep));
+    let resumed = try_render(&buffers.scene(), Method::RadianceCache, SIZE, 8, |settings| {
+        harmonics(settings);
+        settings.resume = Some(film.clone());
+    });
+    let why = resumed.map(|_| ()).unwrap_err().to_string();
+    assert!(why.contains("SphericalHarmonics"), "{why}");
+    std::fs::remove_file(film).unwrap();
 }

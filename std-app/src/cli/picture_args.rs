@@ -177,14 +177,15 @@ pub(super) struct MethodArgs {
     /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: 256]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
-    /// Basis of the coefficients of a record: zernike, or sh for spherical harmonics as in Křivánek et al. (2005)
-    /// [default: zernike]
+    /// Basis of the coefficients of a record: zernike, or sh for spherical harmonics as in Křivánek et al.
+    /// 2005 [default: zernike]
     #[arg(long, value_name = "BASIS", value_parser = values::basis, help_heading = "Radiance cache")]
     basis: Option<Basis>,
     /// Expected error of light from lobes that records serve, relative to all that leaves [default: 0.02]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Radiance cache")]
     lobe_error: Option<f64>,
-    /// Largest degree of the coefficients of a record; lobes that need more are path traced [default: 6; sh: 9]
+    /// Largest degree of the coefficients of a record; lobes that need more are path traced [default: 6, with
+    /// sh 9]
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(1..=9),
         help_heading = "Radiance cache")]
     lobe_degree: Option<u32>,

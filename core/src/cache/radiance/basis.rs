@@ -84,6 +84,14 @@ impl Basis {
         }
     }
 
+    /// Number of functions with m >= 0.
+    pub(super) const fn row_count(self) -> usize {
+        match self {
+            Basis::Zernike => 25,
+            Basis::SphericalHarmonics => ROWS_MAX,
+        }
+    }
+
     /// Degree and order of the functions with m >= 0.
     pub(super) fn rows(self) -> impl Iterator<Item = (usize, usize)> {
         let step = self.step();
@@ -187,6 +195,7 @@ mod tests {
         assert_eq!(of(Basis::Zernike, usize::MAX).0, 45);
         for basis in Basis::ALL {
             assert_eq!(Basis::named(basis.name()), Some(basis));
+            assert_eq!(basis.rows().count(), basis.row_count());
             let rows = basis.rows().map(|(d, m)| basis.index(d, m as isize));
             let sines = basis.rows().filter(|(_, m)| *m > 0).map(|(d, m)| basis.index(d, -(m as isize)));
             let mut numbers: std::vec::Vec<_> = rows.chain(sines).collect();

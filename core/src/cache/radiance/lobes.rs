@@ -1,5 +1,5 @@
-//! Coefficients of microfacet lobes for each direction of the viewer, and the degree that a tolerance needs, in
-//! either basis.
+//! Coefficients of microfacet lobes for each direction of the viewer in either basis, and the degree that a
+//! tolerance needs.
 //!
 //! A GGX lobe depends on alpha and on the viewer's angle θ_o alone, and Schlick's reflectance is linear in
 //! the reflectance f0 at normal incidence: f = f0 W + (1 - f0) E, W with F = 1 and E with F = (1 - c)⁵. One
@@ -10,10 +10,10 @@
 //!
 //! The radiance that leaves is Lo = Σ c_k λ_k. By Cauchy and Schwarz its error is at most the norm of the
 //! lobe beyond degree d, in the inner product of the basis, times that of the light. With Zernike polynomials
-//! τ_d = √π ‖f - P_d f‖/∫ f cos dω is thus the relative error for light of standard deviation 1, as bad as can
-//! be; with spherical harmonics it is √(2π) ‖f cos - P_d f cos‖/∫ f cos dω. In rooms half of τ_d/(d + 2) is the
-//! error that remains in the median, in both: the degree of a lobe is the lowest with that below the tolerance
-//! (Křivánek et al. 2005, with a maximum of the error in its place).
+//! τ_d = √π ‖f - P_d f‖/∫ f cos dω is thus the relative error for light of standard deviation 1, as bad as
+//! can be; with spherical harmonics it is √(2π) ‖f cos - P_d f cos‖/∫ f cos dω. In rooms half of τ_d/(d + 2)
+//! is the error that remains in the median, in both: the degree of a lobe is the lowest with that below the
+//! tolerance (Křivánek et al. 2005, with a maximum of the error in its place).
 
 use super::basis::{Basis, COUNT_MAX, DEGREE_MAX, ROWS_MAX};
 use crate::bsdf::fresnel::{dielectric, schlick_weight};
@@ -50,23 +50,26 @@ pub struct LobeCoefficients {
     pub white: [f32; COUNT_MAX],
     /// With the reflectance (1 - c)⁵.
     pub edge: [f32; COUNT_MAX],
-    /// Number of coefficients.
-    count: usize,
 }
 
 impl LobeCoefficients {
-    /// Coefficients with the reflectance `f0` at normal incidence.
+    /// Coefficients with the reflectance `f0` at normal incidence; zeros beyond those of the basis.
     pub fn of(&self, f0: f32) -> [f32; COUNT_MAX] {
         let mut found = [0.0; COUNT_MAX];
-        let coefficients = self.white.iter().zip(&self.edge).take(self.count);
-        found.iter_mut().zip(coefficients).for_each(|(c, (white, edge))| *c = f0 * white + (1.0 - f0) * edge);
+        found.iter_mut().zip(self.each(f0)).for_each(|(slot, coefficient)| *slot = coefficient);
         found
+    }
+
+    /// The same one by one.
+    #[inline]
+    pub(super) fn each(&self, f0: f32) -> impl Iterator<Item = f32> {
+        self.white.iter().zip(&self.edge).map(move |(white, edge)| f0 * white + (1.0 - f0) * edge)
     }
 }
 
 /// Numbers of rows and of degrees of a basis.
 fn sizes(basis: Basis) -> [usize; 2] {
-    [basis.rows().count(), basis.degree_max() + 1]
+    [basis.row_count(), basis.degree_max() + 1]
 }
 
 impl Lobe {
@@ -108,13 +111,11 @@ impl Lobe {
         for m in 1..turns.len() {
             turns[m] = unit.rotate(turns[m - 1]);
         }
-        let count = self.basis.count(self.basis.degree_max());
-        let mut found = LobeCoefficients { white: [0.0; COUNT_MAX], edge: [0.0; COUNT_MAX], count };
-        for (row, (d, m)) in self.basis.rows().enumerate() {
-            let (cos, sin) = (self.basis.index(d, m as isize), self.basis.index(d, -(m as isize)));
-            for (out, rows) in [&mut found.white, &mut found.edge].into_iter().zip(self.rows) {
-                out[sin] = rows[row] * turns[m].y;
-                out[cos] = rows[row] * turns[m].x;
+        let mut found = LobeCoefficients { white: [0.0; COUNT_MAX], edge: [0.0; COUNT_MAX] };
+        for (out, rows) in [&mut found.white, &mut found.edge].into_iter().zip(&self.rows) {
+            for ((d, m), row) in self.basis.rows().zip(rows) {
+                out[self.basis.index(d, -(m as isize))] = row * turns[m].y;
+                out[self.basis.index(d, m as isize)] = row * turns[m].x;
             }
         }
         found
@@ -149,7 +150,7 @@ impl Lobe {
                     *sum += of_square * product;
                 }
                 for (sums, f) in fourier.iter_mut().zip([white, edge]) {
-                    for (sum, cos) in sums.iter_mut().zip(around).take(degrees) {
+                    for (sum, cos) in sums.iter_mut().zip(around) {
                         *sum += f * cos;
                     }
                 }
@@ -172,11 +173,25 @@ impl Lobe {
         lobe
     }
 
-    /// Numbers of the lobe, as many as its basis has.
-    fn numbers(&mut self) -> impl Iterator<Item = &mut f32> {
+    /// Adds a `node` of the table times `weight`.
+    fn add(&mut self, node: &[f32], weight: f32) {
         let [rows, degrees] = sizes(self.basis);
-        let coefficients = self.rows.iter_mut().flat_map(move |numbers| numbers.iter_mut().take(rows));
-        coefficients.chain(self.rests.iter_mut().flat_map(move |numbers| numbers.iter_mut().take(degrees)))
+        let (coefficients, rests) = node.split_at_checked(2 * rows).unwrap_or_default();
+        let add = |(sums, node): (&mut [f32], &[f32])| {
+            sums.iter_mut().zip(node).for_each(|(sum, number)| *sum += weight * number);
+        };
+        let own = self.rows.iter_mut().map(|own| &mut own[..]);
+        own.zip(coefficients.chunks_exact(rows)).for_each(add);
+        let own = self.rests.iter_mut().map(|own| &mut own[..]);
+        own.zip(rests.chunks_exact(degrees)).for_each(add);
+    }
+
+    /// Writes the lobe to a `node` of the table.
+    fn store(&self, node: &mut [f32]) {
+        let [rows, degrees] = sizes(self.basis);
+        let coefficients = self.rows.iter().flat_map(|row| row.iter().take(rows));
+        let rests = self.rests.iter().flat_map(|rest| rest.iter().take(degrees));
+        node.iter_mut().zip(coefficients.chain(rests)).for_each(|(slot, number)| *slot = *number);
     }
 }
 
@@ -269,8 +284,7 @@ impl<'m> LobeTable<'m> {
             let angle = (at % ANGLES) as f32 * ANGLE_MAX / (ANGLES - 1) as f32;
             let alpha =
                 ALPHA_MIN * libm::powf(1.0 / ALPHA_MIN, (at / ANGLES) as f32 / (ROUGHNESSES - 1) as f32);
-            let mut lobe = Lobe::integrate([angle, alpha], &reflectance, &factors);
-            node.iter_mut().zip(lobe.numbers()).for_each(|(slot, number)| *slot = *number);
+            Lobe::integrate([angle, alpha], &reflectance, &factors).store(node);
         }
         Ok(Self { basis, nodes })
     }
@@ -297,9 +311,7 @@ impl<'m> LobeTable<'m> {
         for (row, weight) in [(j, 1.0 - t), (j + 1, t)] {
             for (column, share) in [(i, 1.0 - s), (i + 1, s)] {
                 let first = (row * ANGLES + column) * count;
-                let weight = weight * share;
-                let node = self.nodes.get(first..first + count)?;
-                lobe.numbers().zip(node).for_each(|(sum, number)| *sum += weight * number);
+                lobe.add(self.nodes.get(first..first + count)?, weight * share);
             }
         }
         Some(lobe)

@@ -1,11 +1,11 @@
 //! Radiance caching (Křivánek et al. 2005): incident radiance of a point in coefficients of a basis.
 //!
-//! [`zernike`] is the default basis, [`sh`] that of the paper, and [`Basis`] is either. [`GatherTables`] project
-//! the light of gather rays: for [`zernike`] by [`StrataTables`] to [`Coefficients`], with [`derivatives`] as
-//! their change with position. A [`CoefficientPool`] stores the coefficients of many records, and
-//! [`RecordCoefficients`] those of a cache. [`lobes`] has the coefficients of BSDFs, [`ServedLobes`] decides
-//! which lobes of a scene records serve. For normals other than that of the hemisphere [`mirrored_viewer`]
-//! moves the viewer, and spherical harmonics are rotated.
+//! [`zernike`] is the default basis, [`sh`] that of the paper, and [`Basis`] is either. [`GatherTables`]
+//! project the light of gather rays: for [`zernike`] by [`StrataTables`] to [`Coefficients`], with
+//! [`derivatives`] as their change with position. A [`CoefficientPool`] stores the coefficients of many
+//! records, and [`RecordCoefficients`] those of a cache. [`lobes`] has the coefficients of BSDFs, and
+//! [`ServedLobes`] decides which lobes of a scene records serve. For normals other than that of the
+//! hemisphere [`mirrored_viewer`] moves the viewer, and spherical harmonics are rotated.
 
 mod basis;
 mod coefficients;

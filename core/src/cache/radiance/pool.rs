@@ -1,9 +1,9 @@
 //! Coefficients of many records as half floats in the caller's memory, and the light that a lobe reflects
 //! from them.
 //!
-//! A record has coefficients over E/√π, which is the coefficient of degree 0 of Zernike polynomials, and their
-//! gradients over E/√π times a unit of length, both of which are of the order of 1 in every scene. Zernike
-//! polynomials of degree 6 take 384 bytes, of degree 8 672, spherical harmonics of order 9 2016.
+//! A record has coefficients over E/√π, which is the coefficient of degree 0 of Zernike polynomials, and
+//! their gradients over E/√π times a unit of length, both of which are of the order of 1 in every scene.
+//! Zernike polynomials of degree 6 take 384 bytes, of degree 8 672; spherical harmonics of order 9 take 2016.
 
 use super::basis::{Basis, COUNT_MAX, Representation};
 use super::coefficients::Coefficients;
@@ -16,7 +16,8 @@ use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
 use glam::Vec2;
 use halflight_simd::half::from_f32;
-use halflight_simd::kernels::dots::Dots;
+use halflight_simd::kernels::dots::dot;
+use halflight_simd::{Kernel, Simd};
 
 /// Least and greatest ratio of extrapolated light to that at the record.
 const EXTRAPOLATION: [f32; 2] = [0.05, 20.0];
@@ -49,20 +50,57 @@ pub struct Weights {
 impl Weights {
     /// Weights of the first coefficients; those of all others are zero.
     pub fn new(weights: &[f32]) -> Self {
-        let mut registers = [[0.0; 16]; GROUPS_MAX];
-        let entries = registers.as_flattened_mut().iter_mut().zip(weights);
-        entries.for_each(|(entry, weight)| *entry = *weight);
-        Self { registers, groups: weights.len().div_ceil(16).min(GROUPS_MAX) }
+        Self::of(weights.len(), weights.iter().copied())
     }
 
-    /// Dot product with `row`, whose further registers have no weight.
-    fn dot(&self, level: Level, row: &[[u16; 16]]) -> f32 {
-        let groups = self.groups.min(row.len());
-        let mut sum = [0.0];
-        let rows = row.get(..groups).unwrap_or_default();
-        Dots { rows, weights: self.registers.get(..groups).unwrap_or_default(), out: &mut sum }
-            .compute(level);
-        sum[0]
+    /// Weights of the first `count` coefficients.
+    #[inline]
+    pub(super) fn of(count: usize, weights: impl Iterator<Item = f32>) -> Self {
+        let mut registers = [[0.0; 16]; GROUPS_MAX];
+        let entries = registers.as_flattened_mut().iter_mut().take(count);
+        entries.zip(weights).for_each(|(entry, weight)| *entry = weight);
+        Self { registers, groups: count.div_ceil(16).min(GROUPS_MAX) }
+    }
+
+    /// Adds to the weight of coefficient `k`, if it is one of those in use.
+    pub(super) fn add(&mut self, k: usize, weight: f32) {
+        if let Some(entry) = self.registers.as_flattened_mut().get_mut(k) {
+            *entry += weight;
+        }
+    }
+
+    /// Weights of all coefficients.
+    pub(super) fn all(&self) -> &[f32; COUNT_MAX] {
+        self.registers.as_flattened().first_chunk().unwrap_or(&[0.0; COUNT_MAX])
+    }
+}
+
+/// Dot products of the weights of each channel with its values, and with both components of its gradients.
+struct OfRecord<'a> {
+    rows: &'a [[u16; 16]],
+    /// Registers of a channel's values, and of a component of their gradients.
+    groups: [usize; 2],
+    weights: [&'a Weights; 3],
+}
+
+impl Kernel for OfRecord<'_> {
+    type Out = [[f32; 3]; 3];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Out {
+        let [values, slopes] = self.groups;
+        let mut products = [[0.0; 3]; 3];
+        for (channel, (products, weights)) in products.iter_mut().zip(self.weights).enumerate() {
+            let slope = 3 * values + 2 * channel * slopes;
+            let rows = [(channel * values, values), (slope, slopes), (slope + slopes, slopes)];
+            for (product, (first, count)) in products.iter_mut().zip(rows) {
+                // Registers beyond those of the weights add nothing.
+                let groups = weights.groups.min(count);
+                let row = self.rows.get(first..first + groups).unwrap_or_default();
+                *product = dot(simd, row, &weights.registers);
+            }
+        }
+        products
     }
 }
 
@@ -106,7 +144,8 @@ impl<'a> Expansion<'a> {
 /// ```
 /// use glam::Vec2;
 /// use halflight_core::Level;
-/// use halflight_core::cache::radiance::{Basis, Coefficients, CoefficientPool, Expansion, Representation, Weights};
+/// use halflight_core::cache::radiance::{Basis, CoefficientPool, Coefficients, Expansion, Representation};
+/// use halflight_core::cache::radiance::Weights;
 /// use halflight_core::memory::{Arena, Line};
 /// let of = Representation { basis: Basis::Zernike, degree: 2 };
 /// let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(10, of).bytes() / 64];
@@ -253,21 +292,16 @@ impl<'m> CoefficientPool<'m> {
     ) -> Rgb {
         let [values, slopes] = record.counts();
         let Some(rows) = self.registers.get(record.range()) else { return Rgb::ZERO };
-        let (of_values, of_slopes) = rows.split_at(3 * values);
+        let products = level.dispatch(OfRecord { rows, groups: [values, slopes], weights });
         let step = if record.unit > 0.0 { delta / record.unit } else { Vec2::ZERO };
         let mut reflected = [0.0; 3];
-        for (channel, (reflected, weights)) in reflected.iter_mut().zip(weights).enumerate() {
-            let row = |rows: &[[u16; 16]], number: usize, count: usize| {
-                let row = rows.get(number * count..(number + 1) * count);
-                weights.dot(level, row.unwrap_or_default())
-            };
-            let own = row(of_values, channel, values);
-            let slope =
-                Vec2::new(row(of_slopes, 2 * channel, slopes), row(of_slopes, 2 * channel + 1, slopes));
+        for ((reflected, [own, x, y]), irradiance) in
+            reflected.iter_mut().zip(products).zip(record.irradiance)
+        {
             let here = own.max(0.0);
-            let there = own + step.dot(slope);
+            let there = own + step.dot(Vec2::new(x, y));
             let within = there.max(EXTRAPOLATION[0] * here).min(EXTRAPOLATION[1] * here);
-            *reflected = record.irradiance[channel] * (1.0 / libm::sqrtf(PI)) * within;
+            *reflected = irradiance * (1.0 / libm::sqrtf(PI)) * within;
         }
         Rgb::from_array(reflected)
     }

@@ -12,7 +12,7 @@
 //! exactly from the frame of the point into that of the record (Křivánek et al. 2005): Σ c_k (R λ)_k = Σ (R⁻¹
 //! c)_k λ_k. With Zernike polynomials it has the degree of the records, and the viewer is moved.
 
-use super::basis::{Basis, COUNT_MAX, DEGREE_MAX, Representation};
+use super::basis::{Basis, DEGREE_MAX, Representation};
 use super::lobes::{Lobe, LobeTable};
 use super::mirrored_viewer;
 use super::pool::Weights;
@@ -306,7 +306,8 @@ impl ServedLobe<'_> {
                 let rotation =
                     ShRotation::new(&Mat3::from_cols(axes[0], axes[1], axes[2]), self.representation.degree);
                 let unturned = self.channels(&self.lobe, own.to_local(viewer));
-                Some(unturned.map(|weights| self.cut(&rotation.apply(&weights))))
+                let count = self.representation.count();
+                Some(unturned.map(|weights| Weights::of(count, rotation.apply(weights.all()).into_iter())))
             }
             Basis::SphericalHarmonics => self.weights_for(record.to_local(viewer), false),
         }
@@ -317,29 +318,23 @@ impl ServedLobe<'_> {
     /// ratio of the albedos. `None` if records do not serve it.
     fn weights_for(&self, viewer: Vec3, is_turned: bool) -> Option<[Weights; 3]> {
         let turned = if is_turned { Some(self.table.lobe(viewer.z, self.of.alpha)?) } else { None };
-        let channels = self.channels(turned.as_ref().unwrap_or(&self.lobe), viewer);
-        Some(channels.each_ref().map(|weights| self.cut(weights)))
+        Some(self.channels(turned.as_ref().unwrap_or(&self.lobe), viewer))
     }
 
     /// Weights of each channel for the lobe of a viewer in the local direction `viewer`, with the albedo of
     /// the lobe of the surface.
-    fn channels(&self, lobe: &Lobe, viewer: Vec3) -> [[f32; COUNT_MAX]; 3] {
+    fn channels(&self, lobe: &Lobe, viewer: Vec3) -> [Weights; 3] {
         let coefficients = lobe.turned(viewer.truncate());
         let (f0, tint) = (self.of.f0.to_array(), self.of.tint.to_array());
+        let count = self.representation.count();
         core::array::from_fn(|channel| {
             let ratio = self.lobe.albedo(f0[channel]) / lobe.albedo(f0[channel]);
             let factor = tint[channel] * if ratio.is_finite() { ratio } else { 0.0 };
-            let mut weights = coefficients.of(f0[channel]);
-            weights.iter_mut().for_each(|weight| *weight *= factor);
-            for (zonal, k) in self.base[channel].iter().zip(zonal_functions(self.representation.basis)) {
-                weights[k] += zonal;
-            }
+            let of_lobe = coefficients.each(f0[channel]).map(|weight| factor * weight);
+            let mut weights = Weights::of(count, of_lobe);
+            let functions = zonal_functions(self.representation.basis).take_while(|&k| k < count);
+            functions.zip(self.base[channel]).for_each(|(k, zonal)| weights.add(k, zonal));
             weights
         })
-    }
-
-    /// Weights up to the degree of the lobe.
-    fn cut(&self, weights: &[f32; COUNT_MAX]) -> Weights {
-        Weights::new(weights.get(..self.representation.count()).unwrap_or_default())
     }
 }

@@ -120,8 +120,8 @@ fn degrees_follow_the_tolerance() {
     });
 }
 
-/// Spherical harmonics need a degree or two more than Zernike polynomials; orders rise with the angle and fall
-/// with roughness, and narrow lobes have none.
+/// Spherical harmonics need a degree or two more than Zernike polynomials; orders rise with the angle and
+/// fall with roughness, and narrow lobes have none.
 #[test]
 fn orders_follow_the_tolerance() {
     with_lobes(Basis::SphericalHarmonics, |table| {

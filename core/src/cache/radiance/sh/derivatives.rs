@@ -9,7 +9,7 @@
 //!
 //! ∇ on the sphere. Ω is that of the stratum. (The paper was not at hand; this is our reading.)
 
-use super::{COUNT_MAX, ShTables, count, gradients, values};
+use super::{COUNT_MAX, Recurrence, ShTables, count, values};
 use crate::cache::hemisphere::Hemisphere;
 use crate::cache::radiance::derivatives::GRAZING;
 use glam::{Vec2, Vec3};
@@ -50,6 +50,7 @@ fn patches<'h>(tables: &ShTables<'h>, hemisphere: &Hemisphere<'h>) -> Option<imp
 /// Gradients of all coefficients by the derivatives of basis and solid angle. `None` without normals, or if
 /// the hemisphere has another number of strata than the tables.
 pub fn unoccluded(tables: &ShTables, hemisphere: &Hemisphere) -> Option<ShGradients> {
+    let recurrence = Recurrence::new();
     let mut found = [[[0.0; 2]; COUNT_MAX]; 3];
     for Patch { radiance, inverse_distance, direction: w, normal: m, solid_angle } in
         patches(tables, hemisphere)?
@@ -57,7 +58,7 @@ pub fn unoccluded(tables: &ShTables, hemisphere: &Hemisphere) -> Option<ShGradie
         let facing = m.dot(w);
         let slant = m.truncate() / facing.abs().max(GRAZING).copysign(facing);
         let (widening, factor) = (3.0 * w.truncate() - slant, solid_angle * inverse_distance);
-        let functions = gradients(tables.order(), w.to_array());
+        let functions = recurrence.gradients(tables.order(), w.to_array());
         for (k, [x, y, _, value]) in functions.into_iter().enumerate().take(count(tables.order())) {
             let change = factor * (value * widening - Vec2::new(x, y));
             for (gradients, light) in found.iter_mut().zip(radiance) {

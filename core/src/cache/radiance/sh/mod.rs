@@ -44,21 +44,14 @@ pub const fn index(l: usize, m: isize) -> usize {
 /// ```
 pub fn values(order: usize, direction: [f32; 3]) -> [f32; COUNT_MAX] {
     let mut values = [0.0; COUNT_MAX];
-    each(order, direction, |k, Function { part, p, .. }| values[k] = part * p);
+    Recurrence::new().each(order, direction, |k, Function { part, p, .. }| values[k] = part * p);
     values
 }
 
-/// Values of all functions up to `order` in the unit direction w, and their gradients on the sphere,
-/// ∇Y - w (w·∇Y) in three coordinates; zeros beyond.
+/// Gradients of all functions up to `order` on the sphere, ∇Y - w (w·∇Y) in three coordinates, and values, in
+/// the unit direction w; zeros beyond.
 pub fn gradients(order: usize, direction: [f32; 3]) -> [[f32; 4]; COUNT_MAX] {
-    let w = Vec3::from(direction);
-    let mut found = [[0.0; 4]; COUNT_MAX];
-    each(order, direction, |k, Function { part, along, p, slope }| {
-        let gradient = (p * along).extend(part * slope);
-        let tangential = gradient - w.dot(gradient) * w;
-        found[k] = tangential.extend(part * p).to_array();
-    });
-    found
+    Recurrence::new().gradients(order, direction)
 }
 
 /// Function p_l^m(z) Re or Im (x + iy)^m.
@@ -72,37 +65,70 @@ struct Function {
     slope: f32,
 }
 
-/// Calls `with` for the functions up to `order`, with their numbers.
-#[inline(always)]
-fn each(order: usize, [x, y, z]: [f32; 3], mut with: impl FnMut(usize, Function)) {
-    let order = order.min(ORDER_MAX);
-    // p_m^m, (x + iy)^m, and its derivative m (x + iy)^(m-1).
-    let (mut diagonal, mut power, mut derivative) = (libm::sqrtf(0.25 / PI), Vec2::X, Vec2::ZERO);
-    for m in 0..=order {
-        if m > 0 {
-            diagonal *= libm::sqrtf((2 * m + 1) as f32 / (2 * m) as f32);
-            derivative = m as f32 * power;
-            power = Vec2::new(x, y).rotate(power);
+/// Factors of the recurrence over l.
+struct Recurrence {
+    /// p_m^m.
+    diagonal: [f32; ORDER_MAX + 1],
+    /// a and b of p_l^m = a (z p_{l-1}^m - b p_{l-2}^m), by l and m.
+    factors: [[[f32; 2]; ORDER_MAX + 1]; ORDER_MAX + 1],
+}
+
+impl Recurrence {
+    fn new() -> Self {
+        let mut diagonal = [libm::sqrtf(0.25 / PI); ORDER_MAX + 1];
+        let mut factors = [[[0.0; 2]; ORDER_MAX + 1]; ORDER_MAX + 1];
+        for m in 0..=ORDER_MAX {
+            if m > 0 {
+                diagonal[m] = diagonal[m - 1] * libm::sqrtf((2 * m + 1) as f32 / (2 * m) as f32);
+            }
+            for (l, factors) in factors.iter_mut().enumerate().skip(m + 1) {
+                let [l, squared, k] = [l * l, m * m, (l - 1) * (l - 1)].map(|n| n as f32);
+                let a = libm::sqrtf((4.0 * l - 1.0) / (l - squared));
+                factors[m] = [a, libm::sqrtf((k - squared) / (4.0 * k - 1.0).max(1.0))];
+            }
         }
-        let factor = if m == 0 { 1.0 } else { SQRT_2 };
-        let [cos, sin] = (factor * power).to_array();
-        let [re, im] = (factor * derivative).to_array();
-        // p and its derivative for l - 1 and l - 2.
-        let (mut before, mut last) = ([0.0; 2], [0.0; 2]);
-        for l in m..=order {
-            let [p, slope] = match l - m {
-                0 => [diagonal, 0.0],
-                _ => {
-                    let [l, m, k] = [l * l, m * m, (l - 1) * (l - 1)].map(|n| n as f32);
-                    let a = libm::sqrtf((4.0 * l - 1.0) / (l - m));
-                    let b = libm::sqrtf((k - m) / (4.0 * k - 1.0).max(1.0));
-                    [a * (z * last[0] - b * before[0]), a * (last[0] + z * last[1] - b * before[1])]
-                }
-            };
-            (before, last) = (last, [p, slope]);
-            let function = |part, along| Function { part, along, p, slope };
-            with(index(l, -(m as isize)), function(sin, Vec2::new(im, re)));
-            with(index(l, m as isize), function(cos, Vec2::new(re, -im)));
+        Self { diagonal, factors }
+    }
+
+    /// [`gradients`].
+    fn gradients(&self, order: usize, direction: [f32; 3]) -> [[f32; 4]; COUNT_MAX] {
+        let w = Vec3::from(direction);
+        let mut found = [[0.0; 4]; COUNT_MAX];
+        self.each(order, direction, |k, Function { part, along, p, slope }| {
+            let gradient = (p * along).extend(part * slope);
+            let tangential = gradient - w.dot(gradient) * w;
+            found[k] = tangential.extend(part * p).to_array();
+        });
+        found
+    }
+
+    /// Calls `with` for the functions up to `order`, with their numbers.
+    #[inline(always)]
+    fn each(&self, order: usize, [x, y, z]: [f32; 3], mut with: impl FnMut(usize, Function)) {
+        let order = order.min(ORDER_MAX);
+        // (x + iy)^m, and its derivative m (x + iy)^(m-1).
+        let (mut power, mut derivative) = (Vec2::X, Vec2::ZERO);
+        for m in 0..=order {
+            if m > 0 {
+                derivative = m as f32 * power;
+                power = Vec2::new(x, y).rotate(power);
+            }
+            let factor = if m == 0 { 1.0 } else { SQRT_2 };
+            let [cos, sin] = (factor * power).to_array();
+            let [re, im] = (factor * derivative).to_array();
+            // p and its derivative for l - 1 and l - 2.
+            let (mut before, mut last) = ([0.0; 2], [0.0; 2]);
+            for l in m..=order {
+                let [a, b] = self.factors[l][m];
+                let [p, slope] = match l - m {
+                    0 => [self.diagonal[m], 0.0],
+                    _ => [a * (z * last[0] - b * before[0]), a * (last[0] + z * last[1] - b * before[1])],
+                };
+                (before, last) = (last, [p, slope]);
+                let function = |part, along| Function { part, along, p, slope };
+                with(index(l, -(m as isize)), function(sin, Vec2::new(im, re)));
+                with(index(l, m as isize), function(cos, Vec2::new(re, -im)));
+            }
         }
     }
 }

@@ -102,9 +102,9 @@ fn gradients_are_differences_of_values_along_the_sphere() {
     }
 }
 
-/// A disk of radiance 2 + b p_x at height 1 that fills x² + y² < 49/64 of the hemisphere. By Reynolds' theorem its
-/// λ_{0,0} changes along x by b Y_{0,0} times its solid angle, less the flux through the rim. Both gradients of
-/// the paper agree to the square of the step.
+/// A disk of radiance 2 + b p_x at height 1 that fills x² + y² < 49/64 of the hemisphere. By Reynolds'
+/// theorem its λ_{0,0} changes along x by b Y_{0,0} times its solid angle, less the flux through the rim.
+/// Both gradients of the paper agree to the square of the step.
 #[test]
 fn both_gradients_of_the_paper_agree_before_a_slope_of_light() {
     const N: usize = 64;
