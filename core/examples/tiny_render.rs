@@ -53,7 +53,8 @@ pub fn render(
 ) -> Result<(), OutOfMemory> {
     let (mut scene, size) = (room::scene(), SIZE as u32);
     // Radiance records serve wide lobes.
-    let lobes = (method == 9).then_some(LobeSettings { tolerance: 0.05, degree: 2 });
+    let lobes =
+        (method == 9).then_some(LobeSettings { tolerance: 0.05, degree: 2, ..LobeSettings::default() });
     let materials = room::with_metal_wall();
     if lobes.is_some() {
         scene.materials = &materials;

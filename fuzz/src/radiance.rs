@@ -9,7 +9,8 @@ use halflight_core::Level;
 use halflight_core::cache::irradiance::Hemisphere;
 use halflight_core::cache::radiance::derivatives::{border_flux, displaced, unoccluded};
 use halflight_core::cache::radiance::{
-    CoefficientPool, Coefficients, StrataTables, Weights, mirrored_viewer, sh, zernike,
+    Basis, CoefficientPool, Coefficients, Expansion, Representation, StrataTables, Weights, mirrored_viewer,
+    sh, zernike,
 };
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::warp::cosine_hemisphere;
@@ -75,7 +76,9 @@ fn directions(input: &mut Unstructured) -> Result<()> {
     let beyond = zernike::count(degree.min(zernike::DEGREE_MAX));
     assert!(values[beyond..].iter().all(|value| *value == 0.0));
     let _ = zernike::gradients(degree, [a.x, a.y]);
-    let turned = sh::ShRotation::new(&Mat3::from_cols(a, b, c)).apply(&sh::values(degree, a.to_array()));
+    let _ = sh::gradients(degree, a.to_array());
+    let rotation = sh::ShRotation::new(&Mat3::from_cols(a, b, c), degree);
+    let turned = rotation.apply(&sh::values(degree, a.to_array()));
     assert!(turned[0].is_nan() || (turned[0] - 0.282_094_8).abs() < 1e-6);
     Ok(())
 }
@@ -105,6 +108,7 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
     let tables = tables.expect("the footprint is enough");
     let _ = (unoccluded(&tables, &hemisphere), displaced(&tables, &hemisphere, coordinate(input)?));
 
+    harmonics((n, degree), &hemisphere, input)?;
     let of = |level| {
         let light = Coefficients::project(level, &tables, &hemisphere).expect("tables of n");
         let derivatives = border_flux(level, &tables, &hemisphere).expect("tables of n");
@@ -112,11 +116,13 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
     };
     let (light, derivatives) = of(Level::BASELINE);
     let (unit, delta) = (coordinate(input)?, Vec2::new(coordinate(input)?, coordinate(input)?));
-    let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(1, degree).bytes() / 64];
-    let pool = CoefficientPool::new(1, degree, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+    let representation = Representation { basis: Basis::Zernike, degree };
+    let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(1, representation).bytes() / 64];
+    let pool = CoefficientPool::new(1, representation, &mut Arena::over(&mut lines));
     let mut pool = pool.expect("the footprint is enough");
-    let record = pool.push(&light, &derivatives.gradients, unit).expect("memory for one record");
-    let weights = Weights::new(&light.values[1], degree);
+    let record =
+        pool.push(&Expansion::zernike(&light, &derivatives.gradients), unit).expect("memory for one record");
+    let weights = Weights::new(&light.values[1][..zernike::count(degree)]);
     let reflected = pool.reflected(Level::BASELINE, &record, &weights, delta).to_array();
     for level in Level::detect().and_below() {
         let (again, more) = of(level);
@@ -126,6 +132,35 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
         for (wanted, found) in derivatives.hessians.iter().zip(more.hessians) {
             same(level, &[wanted.xx, wanted.xy, wanted.yy], &[found.xx, found.xy, found.yy]);
         }
+        same(level, &reflected, &pool.reflected(level, &record, &weights, delta).to_array());
+    }
+    Ok(())
+}
+
+/// Spherical harmonics of the same hemisphere: projection and look-up have the same bits on every level, and
+/// gradients, rotations and any order do not panic.
+fn harmonics((n, order): (usize, usize), hemisphere: &Hemisphere, input: &mut Unstructured) -> Result<()> {
+    let mut lines = vec![Line([0; 64]); sh::ShTables::footprint(n, order).bytes() / 64];
+    let tables =
+        sh::ShTables::build(n, order, &mut Arena::over(&mut lines)).expect("the footprint is enough");
+    let _ = sh::displaced(&tables, hemisphere, coordinate(input)?);
+    let gradients = sh::unoccluded(&tables, hemisphere).expect("normals");
+    let light = sh::ShCoefficients::project(Level::BASELINE, &tables, hemisphere).expect("tables of n");
+    let representation = Representation { basis: Basis::SphericalHarmonics, degree: order };
+    let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(1, representation).bytes() / 64];
+    let mut pool =
+        CoefficientPool::new(1, representation, &mut Arena::over(&mut lines)).expect("the footprint");
+    let record = pool.push(&Expansion::spherical_harmonics(&light, &gradients), coordinate(input)?);
+    let record = record.expect("memory for one record");
+    let turned =
+        sh::ShRotation::new(&Mat3::from_rotation_y(coordinate(input)?), order).apply(&light.values[0]);
+    // Orders of lobes may be lower than that of the record.
+    let weights = Weights::new(&turned[..sh::count(input.int_in_range(0..=order)?)]);
+    let delta = Vec2::new(coordinate(input)?, coordinate(input)?);
+    let reflected = pool.reflected(Level::BASELINE, &record, &weights, delta).to_array();
+    for level in Level::detect().and_below() {
+        let again = sh::ShCoefficients::project(level, &tables, hemisphere).expect("tables of n");
+        same(level, light.values.as_flattened(), again.values.as_flattened());
         same(level, &reflected, &pool.reflected(level, &record, &weights, delta).to_array());
     }
     Ok(())

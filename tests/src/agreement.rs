@@ -3,7 +3,7 @@
 use crate::render::{blocks_of, render};
 use crate::scenes::SceneBuffers;
 use crate::statistics::agree_within;
-use halflight::render::{Method, RenderResult};
+use halflight::render::{Method, RenderResult, Settings};
 
 /// Independent pictures of each method.
 const REPLICAS: u32 = 8;
@@ -29,9 +29,24 @@ impl Agreement {
     /// method.
     #[track_caller]
     pub fn assert(&self, buffers: &SceneBuffers, method: Method, check: impl Fn(&RenderResult)) {
+        self.assert_with(buffers, method, |_| (), check);
+    }
+
+    /// [`Agreement::assert`] with changed settings.
+    #[track_caller]
+    pub fn assert_with(
+        &self,
+        buffers: &SceneBuffers,
+        method: Method,
+        change: impl Fn(&mut Settings),
+        check: impl Fn(&RenderResult),
+    ) {
         let values = |of, spp| -> Vec<Vec<f64>> {
             let one = |seed| {
-                let result = render(&buffers.scene(), of, self.size, spp, |s| s.seed = seed);
+                let result = render(&buffers.scene(), of, self.size, spp, |s| {
+                    s.seed = seed;
+                    change(s);
+                });
                 assert_eq!(result.counters.dropped.total(), 0);
                 if of == method {
                     check(&result);

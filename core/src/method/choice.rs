@@ -211,7 +211,7 @@ impl Trial {
         memory: &mut impl MemorySource<'m>,
         executor: &mut impl Executor,
     ) -> Result<Option<Self>, OutOfMemory> {
-        let tables = ServedLobes::footprint(context.scene);
+        let tables = ServedLobes::footprint(context.scene, caches.lobes.basis);
         // Lobes of a scene with little memory are left to paths.
         let tables = if F::GLOSSY && memory.has(tables) { tables } else { Footprint::default() };
         let (has_photons, reuse) = (paths.finding().used, paths.reuse());

@@ -11,7 +11,7 @@ use super::view_placement::{ViewPlacement, Views};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
-use crate::cache::radiance::{LobeSettings, PooledRecord, ServedLobes};
+use crate::cache::radiance::{LobeSettings, PooledRecord, Representation, ServedLobes};
 use crate::cache::view::ViewRecords;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::scene::Scene;
@@ -67,17 +67,16 @@ impl CacheSettings {
         self.lobes.map_or(0, |lobes| lobes.strata().max(self.strata))
     }
 
-    /// Degree of the coefficients at most, if records have any.
-    pub fn degree(&self) -> Option<usize> {
-        self.lobes.map(|lobes| lobes.degree)
+    /// Representation of the coefficients at most, if records have any.
+    pub fn representation(&self) -> Option<Representation> {
+        self.lobes.map(|lobes| lobes.representation())
     }
 
     /// Bytes of the tables of lobes in `scene`, and of their strata.
     pub fn lobe_footprint(&self, scene: &Scene) -> Footprint {
         match self.lobes {
-            Some(LobeSettings { degree, .. }) => {
-                ServedLobes::footprint(scene).and(LobeGathering::footprint(self.lobe_strata(), degree))
-            }
+            Some(lobes) => ServedLobes::footprint(scene, lobes.basis)
+                .and(LobeGathering::footprint(self.lobe_strata(), lobes.representation())),
             None => Footprint::default(),
         }
     }
@@ -145,11 +144,12 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             _ => None,
         };
         let served = lobes.as_ref().map(|gathering| *gathering.lobes());
-        let degree = served.as_ref().map(ServedLobes::degree);
+        let representation = served.as_ref().map(ServedLobes::representation);
 
         let views = match settings.lobes {
             Some(_) if F::GLOSSY => {
-                let records = CacheBuilder::footprint(settings.fewest, degree).bytes().saturating_mul(2);
+                let records =
+                    CacheBuilder::footprint(settings.fewest, representation).bytes().saturating_mul(2);
                 Views::new(context, settings.reserve.saturating_add(records), memory)?
             }
             _ => None,
@@ -157,10 +157,11 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         let available = memory.available().saturating_sub(settings.reserve);
         let wanted = (context.pixels() / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
         let wanted = wanted.saturating_add(settings.fewest);
-        let capacity = wanted.min(CacheBuilder::capacity_of(available / 2, degree)).max(settings.fewest);
+        let capacity =
+            wanted.min(CacheBuilder::capacity_of(available / 2, representation)).max(settings.fewest);
         let bounds = context.bvh.bounds();
         let mut builder = |index| {
-            let mut arena = memory.take("cache", CacheBuilder::footprint(capacity, degree))?;
+            let mut arena = memory.take("cache", CacheBuilder::footprint(capacity, representation))?;
             CacheBuilder::new(&bounds, capacity, index, served, &mut arena)
         };
         let builders = [builder(0)?, builder(1)?];

@@ -53,13 +53,19 @@ impl Kernel for Dots<'_> {
     fn run<S: Simd>(self, simd: S) {
         let groups = self.weights.len().max(1);
         for (row, out) in self.rows.chunks_exact(groups).zip(self.out) {
-            let mut sums = simd.splat16(0.0);
-            for (entries, weights) in row.iter().zip(self.weights) {
-                sums = sums + simd.load16_half(entries) * simd.load16(weights);
-            }
-            *out = total(sums);
+            *out = dot(simd, row, self.weights);
         }
     }
+}
+
+/// Dot product of one row, as in [`Dots`].
+#[inline(always)]
+pub fn dot<S: Simd>(simd: S, row: &[[u16; 16]], weights: &[[f32; 16]]) -> f32 {
+    let mut sums = simd.splat16(0.0);
+    for (entries, weights) in row.iter().zip(weights) {
+        sums = sums + simd.load16_half(entries) * simd.load16(weights);
+    }
+    total(sums)
 }
 
 #[cfg(test)]

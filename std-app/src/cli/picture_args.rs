@@ -15,6 +15,7 @@ use halflight::render::{
 use halflight::report::quantity::readable_bytes;
 use halflight::save::Image;
 use halflight_core::cache::irradiance::Metric;
+use halflight_core::cache::radiance::Basis;
 use halflight_core::photon;
 use halflight_simd::{Level, Tier};
 use std::path::{Path, PathBuf};
@@ -72,6 +73,7 @@ impl PictureArgs {
         let (file, defaults) = (&loaded.settings, Settings::default());
         let [width, height] = self.size.or(file.size).unwrap_or([defaults.width, defaults.height]);
         self.check_reference(reference.as_deref(), [width, height])?;
+        args.check_degree()?;
         let of_file = || MethodArg::from_str(file.method.as_deref()?, true).ok()?.0;
         Ok(args.apply(Settings {
             method: method.0.or_else(of_file),
@@ -175,11 +177,16 @@ pub(super) struct MethodArgs {
     /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: 256]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
+    /// Basis of the coefficients of a record: zernike, or sh for spherical harmonics as in Křivánek et al.
+    /// 2005 [default: zernike]
+    #[arg(long, value_name = "BASIS", value_parser = values::basis, help_heading = "Radiance cache")]
+    basis: Option<Basis>,
     /// Expected error of light from lobes that records serve, relative to all that leaves [default: 0.02]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Radiance cache")]
     lobe_error: Option<f64>,
-    /// Largest degree of the coefficients of a record; lobes that need more are path traced [default: 6]
-    #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(1..=8),
+    /// Largest degree of the coefficients of a record; lobes that need more are path traced [default: 6, with
+    /// sh 9]
+    #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(1..=9),
         help_heading = "Radiance cache")]
     lobe_degree: Option<u32>,
     /// Kernel of density estimates [default: epanechnikov]
@@ -269,6 +276,26 @@ impl When {
 }
 
 impl MethodArgs {
+    fn lobes(&self) -> LobeSettings {
+        let usual = LobeSettings::of(self.basis.unwrap_or_default());
+        LobeSettings {
+            tolerance: self.lobe_error.map_or(usual.tolerance, |error| error as f32),
+            degree: self.lobe_degree.map_or(usual.degree, |degree| degree as usize),
+            ..usual
+        }
+    }
+
+    /// Refuses a degree that the basis does not have.
+    fn check_degree(&self) -> Result<(), Failure> {
+        let LobeSettings { basis, degree, .. } = self.lobes();
+        let (name, most) = (basis.name(), basis.degree_max());
+        if degree <= most {
+            return Ok(());
+        }
+        let message = format!("--lobe-degree {degree}: the basis {name} has degrees up to {most}");
+        Err(Failure::new(message).advice("take a lower degree, or --basis sh".to_owned()))
+    }
+
     /// `settings` with these.
     pub(super) fn apply(&self, settings: Settings) -> Settings {
         let kernel = match self.photon_kernel {
@@ -289,10 +316,7 @@ impl MethodArgs {
                 error: self.cache_error.map(|error| error as f32),
                 strata: self.cache_rays.map(u32::isqrt),
             },
-            lobes: LobeSettings {
-                tolerance: self.lobe_error.map_or(settings.lobes.tolerance, |error| error as f32),
-                degree: self.lobe_degree.map_or(settings.lobes.degree, |degree| degree as usize),
-            },
+            lobes: self.lobes(),
             photons: PhotonSettings { kernel, global: self.global_photons, caustic: self.caustic_photons },
             bidirectional: BidirectionalSettings {
                 light_paths: self.light_paths,

@@ -3,15 +3,23 @@
 use super::failure::Failure;
 use super::stdio::print_result;
 use clap::{Args, ValueEnum};
-use halflight::render::{ALPHAS, BasisError, GradientError, RenderError, study_bases, study_gradients};
+use halflight::render::{
+    ALPHAS, BasisError, GradientError, LobeDegrees, RadianceMetricError, RadianceTimes, RenderError,
+    STUDY_ANGLES, STUDY_RECORDS, picture_of_radiance_metrics, study_bases, study_gradients,
+    study_lobe_degrees, study_radiance_metrics, study_radiance_times,
+};
+use halflight::save;
 use serde_json::{Map, Value, json};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Bases and derivatives of radiance coefficients in rooms of known light
+/// Bases, derivatives, metrics and times of radiance coefficients in rooms of known light
 ///
 /// Bases: light that metal of several roughnesses reflects from incident light, by the number of its
 /// coefficients. Gradients: derivatives of coefficients from gather rays against exact ones, in rooms with
-/// and without a surface that hides others.
+/// and without a surface that hides others. Degrees: those of lobes within a tolerance. Metrics: error
+/// between records of the light from metal, by rules for the radii at equal numbers of records. Times:
+/// look-ups, and coefficients of a record.
 #[derive(Args)]
 pub(super) struct Radiance {
     /// Parts of the study [default: all]
@@ -21,6 +29,9 @@ pub(super) struct Radiance {
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "16,32,64",
         value_parser = clap::value_parser!(u8).range(4..=128))]
     strata: Vec<u8>,
+    /// Picture of errors and records on a floor by two metrics, 150 records each
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    picture: Option<PathBuf>,
     /// Print one JSON object instead of text
     #[arg(long, help_heading = "Results")]
     json: bool,
@@ -31,6 +42,9 @@ pub(super) struct Radiance {
 enum Part {
     Bases,
     Gradients,
+    Degrees,
+    Metrics,
+    Times,
 }
 
 impl Radiance {
@@ -55,6 +69,32 @@ impl Radiance {
             })
             .map_err(failure)?;
             object.insert("gradients".to_owned(), rows.into());
+        }
+        if has(Part::Degrees) {
+            output.text(&degrees_head());
+            let degrees = study_lobe_degrees().map_err(failure)?;
+            degrees.iter().for_each(|row| output.text(&degrees_text(row)));
+            object.insert("degrees".to_owned(), degrees.iter().map(degrees_object).collect());
+        }
+        if has(Part::Metrics) {
+            let mut rows = Vec::new();
+            output.text(&metrics_head());
+            study_radiance_metrics(&mut |row| {
+                output.text(&metric_text(row));
+                rows.push(metric_object(row));
+            })
+            .map_err(failure)?;
+            object.insert("metrics".to_owned(), rows.into());
+        }
+        if let Some(path) = &self.picture {
+            let picture = picture_of_radiance_metrics().map_err(failure)?;
+            save::write(path, &picture).map_err(|error| Failure::new(error.to_string()))?;
+        }
+        if has(Part::Times) {
+            output.text(TIMES);
+            let times = study_radiance_times().map_err(failure)?;
+            times.iter().for_each(|row| output.text(&time_text(row)));
+            object.insert("times".to_owned(), times.iter().map(time_object).collect());
         }
         output.printed?;
         if self.json {
@@ -128,5 +168,91 @@ fn gradient_object(row: &GradientError) -> Value {
         "gradient": row.gradient,
         "hessian": row.hessian,
         "reflected": { "borders": borders, "analytic": analytic, "displaced": displaced },
+    })
+}
+
+/// Head of the table of degrees.
+fn degrees_head() -> String {
+    let angles = STUDY_ANGLES.map(|angle| format!("{angle:>4.0}")).concat();
+    format!(
+        "lowest degree of metal within an expected error, by angle of the viewer\nbasis    alpha error{angles}"
+    )
+}
+
+fn degrees_text(row: &LobeDegrees) -> String {
+    let degree = |degree: Option<usize>| degree.map_or("-".to_owned(), |degree| degree.to_string());
+    let degrees = row.degrees.map(|found| format!("{:>4}", degree(found))).concat();
+    format!("{:<8} {:>5.2} {:>5.2}{degrees}", row.basis.name(), row.alpha, row.tolerance)
+}
+
+fn degrees_object(row: &LobeDegrees) -> Value {
+    let degrees: Vec<_> = STUDY_ANGLES
+        .into_iter()
+        .zip(row.degrees)
+        .map(|(angle, degree)| json!({ "angle": angle, "degree": degree }))
+        .collect();
+    json!({ "basis": row.basis.name(), "alpha": row.alpha, "tolerance": row.tolerance, "degrees": degrees })
+}
+
+/// Head of the table of metrics.
+fn metrics_head() -> String {
+    let counts = STUDY_RECORDS.map(|count| format!("{count:>8}")).concat();
+    format!(
+        "error of light from metal of alpha 0.3 between records, over the mean light, by number of records\n\
+         room     basis    radii                       {counts}   at records"
+    )
+}
+
+fn metric_text(row: &RadianceMetricError) -> String {
+    let errors = row.errors.map(|error| format!("{error:>8.4}")).concat();
+    format!("{:<8} {:<8} {:<28}{errors}     {:>8.4}", row.room, row.basis.name(), row.rule, row.own)
+}
+
+fn metric_object(row: &RadianceMetricError) -> Value {
+    let errors: Vec<_> = STUDY_RECORDS
+        .into_iter()
+        .zip(row.errors)
+        .map(|(records, error)| json!({ "records": records, "error": error }))
+        .collect();
+    json!({
+        "room": row.room,
+        "basis": row.basis.name(),
+        "radii": row.rule,
+        "errors": errors,
+        "at_records": row.own,
+    })
+}
+
+/// Head of the table of times.
+const TIMES: &str = "\
+times: of a look-up in ns, of a record of 1024 rays in µs
+basis    degree  bytes  10 records     lobe rotation  projection gradients irradiance";
+
+fn time_text(row: &RadianceTimes) -> String {
+    let rotation = row.rotation.map_or("-".to_owned(), |rotation| format!("{rotation:.0}"));
+    format!(
+        "{:<8} {:>6} {:>6} {:>11.0} {:>8.0} {rotation:>8} {:>11.1} {:>9.1} {:>10.1}",
+        row.basis.name(),
+        row.degree,
+        row.bytes,
+        row.records,
+        row.lobe,
+        row.projection,
+        row.gradients,
+        row.irradiance,
+    )
+}
+
+fn time_object(row: &RadianceTimes) -> Value {
+    json!({
+        "basis": row.basis.name(),
+        "degree": row.degree,
+        "bytes": row.bytes,
+        "records_ns": row.records,
+        "lobe_ns": row.lobe,
+        "rotation_ns": row.rotation,
+        "projection_us": row.projection,
+        "gradients_us": row.gradients,
+        "irradiance_us": row.irradiance,
     })
 }

@@ -3,6 +3,7 @@
 use core::str::FromStr;
 use halflight::render::Shard;
 use halflight_core::cache::irradiance::Metric;
+use halflight_core::cache::radiance::Basis;
 use halflight_simd::Tier;
 
 /// Vector `X,Y,Z`.
@@ -81,6 +82,12 @@ pub(super) fn tier(name: &str) -> Result<Tier, String> {
 pub(super) fn metric(name: &str) -> Result<Metric, String> {
     let names = Metric::ALL.map(Metric::name).join(", ");
     Metric::named(name).ok_or(format!("the metrics are {names}"))
+}
+
+/// Basis of radiance coefficients by name.
+pub(super) fn basis(name: &str) -> Result<Basis, String> {
+    let names = Basis::ALL.map(Basis::name).join(", ");
+    Basis::named(name).ok_or(format!("the bases are {names}"))
 }
 
 /// Gather rays of a record: squares of multiples of 8.

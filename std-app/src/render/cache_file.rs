@@ -13,7 +13,7 @@ use halflight_core::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLCACH", version: 4, name: "cache" };
+const KIND: Kind = Kind { magic: *b"HLCACH", version: 5, name: "cache" };
 
 /// Records per section.
 const AT_ONCE: usize = 1 << 12;
@@ -45,8 +45,8 @@ impl Identity {
             error: format!("{:e}", settings.cache.allowed()),
             rays: settings.cache.strata().pow(2),
             lobes: (settings.method == Some(Method::RadianceCache)).then(|| {
-                let LobeSettings { tolerance, degree } = settings.lobes;
-                format!("zernike, lobe-degree {degree}, lobe-error {tolerance:e}")
+                let LobeSettings { basis, tolerance, degree } = settings.lobes;
+                format!("{}, lobe-degree {degree}, lobe-error {tolerance:e}", basis.name())
             }),
         }
     }
@@ -404,7 +404,7 @@ mod tests {
         bytes[7] = 3;
         std::fs::write(&path, &bytes).unwrap();
         let why = Reader::open(&path, &identity(), MOST).err().unwrap().to_string();
-        let wanted = "older.cache: is a cache of format 3, and this version of the program reads format 4";
+        let wanted = "older.cache: is a cache of format 3, and this version of the program reads format 5";
         assert!(why.contains(wanted), "{why}");
         std::fs::remove_file(path).unwrap();
     }

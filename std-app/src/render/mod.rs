@@ -45,8 +45,12 @@ pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
-pub use method::{CacheSettings, LobeSettings, MapView, Method, PhotonSettings, PhotonView};
-pub use radiance_study::{ALPHAS, BasisError, GradientError, study_bases, study_gradients};
+pub use method::{Basis, CacheSettings, LobeSettings, MapView, Method, PhotonSettings, PhotonView};
+pub use radiance_study::{
+    ALPHAS, BasisError, GradientError, LobeDegrees, RadianceMetricError, RadianceTimes, STUDY_ANGLES,
+    STUDY_RECORDS, picture_of_radiance_metrics, study_bases, study_gradients, study_lobe_degrees,
+    study_radiance_metrics, study_radiance_times,
+};
 pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
 pub use run::render;

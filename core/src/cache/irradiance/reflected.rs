@@ -1,7 +1,7 @@
 //! Interpolation of the radiance that a lobe reflects, from the valid records with coefficients of a cache.
 
 use super::{IrradianceCache, QueryPoint, Record};
-use crate::cache::radiance::{RecordCoefficients, ServedLobe, Weights, mirrored_viewer};
+use crate::cache::radiance::{RecordCoefficients, ServedLobe, Weights};
 use crate::geometry::Frame;
 use crate::{Level, Rgb};
 use glam::Vec3;
@@ -23,9 +23,7 @@ struct Turned {
 impl Turned {
     fn new(point: &QueryPoint, viewer: &Viewer, normal: Vec3) -> Self {
         let frame = Frame::from_normal(normal);
-        let direction = mirrored_viewer(viewer.direction, point.normal, normal);
-        let weights = direction
-            .and_then(|direction| viewer.lobe.weights(frame.to_local(direction), normal != point.normal));
+        let weights = viewer.lobe.weights(&frame, point.normal, viewer.direction);
         Self { frame, weights }
     }
 }

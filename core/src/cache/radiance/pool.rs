@@ -1,14 +1,14 @@
 //! Coefficients of many records as half floats in the caller's memory, and the light that a lobe reflects
 //! from them.
 //!
-//! A record has coefficients over E/√π, which is the coefficient of degree 0, and their gradients over E/√π
-//! times a unit of length, both of which are of the order of 1 in every scene. Gradients stop two degrees
-//! below the values: higher ones add noise and no precision. Degree 6 takes 384 bytes, degree 8 takes 672.
+//! A record has coefficients over E/√π, which is the coefficient of degree 0 of Zernike polynomials, and
+//! their gradients over E/√π times a unit of length, both of which are of the order of 1 in every scene.
+//! Zernike polynomials of degree 6 take 384 bytes, of degree 8 672; spherical harmonics of order 9 take 2016.
 
-use super::coefficients::{Coefficients, GROUPS_MAX};
+use super::basis::{Basis, COUNT_MAX, Representation};
+use super::coefficients::Coefficients;
 use super::derivatives::Gradients;
-use super::strata::groups;
-use super::zernike::{COUNT_MAX, DEGREE_MAX, count};
+use super::sh::{ShCoefficients, ShGradients};
 use crate::Level;
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -16,7 +16,8 @@ use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
 use glam::Vec2;
 use halflight_simd::half::from_f32;
-use halflight_simd::kernels::dots::Dots;
+use halflight_simd::kernels::dots::dot;
+use halflight_simd::{Kernel, Simd};
 
 /// Least and greatest ratio of extrapolated light to that at the record.
 const EXTRAPOLATION: [f32; 2] = [0.05, 20.0];
@@ -31,40 +32,110 @@ pub struct PooledRecord {
     pub unit: f32,
     /// First register of sixteen half floats.
     offset: u32,
-    /// Degree of the values.
-    degree: u32,
+    /// Registers of the values of a channel, and of a component of their gradients.
+    groups: [u16; 2],
 }
 
-/// Degree of the gradients of a representation.
-const fn gradient_degree(degree: usize) -> usize {
-    match degree {
-        0..=2 => degree,
-        _ => {
-            if degree > 4 {
-                degree - 2
-            } else {
-                2
-            }
-        }
-    }
-}
-
-/// Registers of a record: values of three channels, then gradients along x and y of each.
-const fn registers(degree: usize) -> usize {
-    3 * groups(degree) + 6 * groups(gradient_degree(degree))
-}
+/// Registers of the values of a channel, at most.
+const GROUPS_MAX: usize = COUNT_MAX.div_ceil(16);
 
 /// Weights of the coefficients, in registers of sixteen; zero beyond a degree.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Weights([[f32; 16]; GROUPS_MAX]);
+pub struct Weights {
+    registers: [[f32; 16]; GROUPS_MAX],
+    /// Registers in use.
+    groups: usize,
+}
 
 impl Weights {
-    /// Weights up to `degree`.
-    pub fn new(weights: &[f32; COUNT_MAX], degree: usize) -> Self {
+    /// Weights of the first coefficients; those of all others are zero.
+    pub fn new(weights: &[f32]) -> Self {
+        Self::of(weights.len(), weights.iter().copied())
+    }
+
+    /// Weights of the first `count` coefficients.
+    #[inline]
+    pub(super) fn of(count: usize, weights: impl Iterator<Item = f32>) -> Self {
         let mut registers = [[0.0; 16]; GROUPS_MAX];
-        let entries = registers.as_flattened_mut().iter_mut().zip(weights);
-        entries.take(count(degree.min(DEGREE_MAX))).for_each(|(entry, weight)| *entry = *weight);
-        Self(registers)
+        let entries = registers.as_flattened_mut().iter_mut().take(count);
+        entries.zip(weights).for_each(|(entry, weight)| *entry = weight);
+        Self { registers, groups: count.div_ceil(16).min(GROUPS_MAX) }
+    }
+
+    /// Adds to the weight of coefficient `k`, if it is one of those in use.
+    pub(super) fn add(&mut self, k: usize, weight: f32) {
+        if let Some(entry) = self.registers.as_flattened_mut().get_mut(k) {
+            *entry += weight;
+        }
+    }
+
+    /// Weights of all coefficients.
+    pub(super) fn all(&self) -> &[f32; COUNT_MAX] {
+        self.registers.as_flattened().first_chunk().unwrap_or(&[0.0; COUNT_MAX])
+    }
+}
+
+/// Dot products of the weights of each channel with its values, and with both components of its gradients.
+struct OfRecord<'a> {
+    rows: &'a [[u16; 16]],
+    /// Registers of a channel's values, and of a component of their gradients.
+    groups: [usize; 2],
+    weights: [&'a Weights; 3],
+}
+
+impl Kernel for OfRecord<'_> {
+    type Out = [[f32; 3]; 3];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Out {
+        let [values, slopes] = self.groups;
+        let mut products = [[0.0; 3]; 3];
+        for (channel, (products, weights)) in products.iter_mut().zip(self.weights).enumerate() {
+            let slope = 3 * values + 2 * channel * slopes;
+            let rows = [(channel * values, values), (slope, slopes), (slope + slopes, slopes)];
+            for (product, (first, count)) in products.iter_mut().zip(rows) {
+                // Registers beyond those of the weights add nothing.
+                let groups = weights.groups.min(count);
+                let row = self.rows.get(first..first + groups).unwrap_or_default();
+                *product = dot(simd, row, &weights.registers);
+            }
+        }
+        products
+    }
+}
+
+/// Coefficients of incident radiance and their gradients, to be stored.
+#[derive(Clone, Copy, Debug)]
+pub struct Expansion<'a> {
+    /// Basis and degree.
+    pub representation: Representation,
+    /// Irradiance, W/m².
+    pub irradiance: Rgb,
+    /// Coefficients of each channel.
+    pub values: [&'a [f32]; 3],
+    /// Their gradients, per m.
+    pub gradients: [&'a [[f32; 2]]; 3],
+}
+
+impl<'a> Expansion<'a> {
+    /// Zernike polynomials.
+    pub fn zernike(light: &'a Coefficients, gradients: &'a Gradients) -> Self {
+        Self {
+            representation: Representation { basis: Basis::Zernike, degree: light.degree },
+            irradiance: light.irradiance(),
+            values: light.values.each_ref().map(|values| &values[..]),
+            gradients: gradients.each_ref().map(|gradients| &gradients[..]),
+        }
+    }
+
+    /// Spherical harmonics.
+    pub fn spherical_harmonics(light: &'a ShCoefficients, gradients: &'a ShGradients) -> Self {
+        Self {
+            representation: Representation { basis: Basis::SphericalHarmonics, degree: light.order },
+            irradiance: light.irradiance,
+            values: light.values.each_ref().map(|values| &values[..]),
+            gradients: gradients.each_ref().map(|gradients| &gradients[..]),
+        }
     }
 }
 
@@ -73,16 +144,16 @@ impl Weights {
 /// ```
 /// use glam::Vec2;
 /// use halflight_core::Level;
-/// use halflight_core::cache::radiance::{Coefficients, CoefficientPool, Weights};
+/// use halflight_core::cache::radiance::{Basis, CoefficientPool, Coefficients, Expansion, Representation};
+/// use halflight_core::cache::radiance::Weights;
 /// use halflight_core::memory::{Arena, Line};
-/// let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(10, 2).bytes() / 64];
-/// let mut pool = CoefficientPool::new(10, 2, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
+/// let of = Representation { basis: Basis::Zernike, degree: 2 };
+/// let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(10, of).bytes() / 64];
+/// let mut pool = CoefficientPool::new(10, of, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
 /// let mut light = Coefficients { degree: 2, values: [[0.0; 45]; 3] };
 /// light.values = light.values.map(|mut values| { values[0] = 2.0; values });
-/// let record = pool.push(&light, &[[[0.0; 2]; 45]; 3], 0.1).unwrap();
-/// let mut lobe = [0.0; 45];
-/// lobe[0] = 0.5;
-/// let reflected = pool.reflected(Level::detect(), &record, &Weights::new(&lobe, 2), Vec2::ZERO);
+/// let record = pool.push(&Expansion::zernike(&light, &[[[0.0; 2]; 45]; 3]), 0.1).unwrap();
+/// let reflected = pool.reflected(Level::detect(), &record, &Weights::new(&[0.5]), Vec2::ZERO);
 /// assert!((reflected.x - 1.0).abs() < 1e-3);
 /// # Ok::<(), halflight_core::memory::OutOfMemory>(())
 /// ```
@@ -101,34 +172,31 @@ impl PooledRecord {
     /// True if it is none, or a record whose coefficients are among `registers`.
     pub fn is_sound(&self, registers: usize) -> bool {
         let finite = self.irradiance.iter().all(|value| value.is_finite() && *value >= 0.0);
-        let is_inside = self.degree as usize <= DEGREE_MAX && self.range().end <= registers;
+        let is_inside = self.groups != [0; 2] && self.range().end <= registers;
         *self == Self::default() || finite && self.unit.is_finite() && self.unit > 0.0 && is_inside
     }
 
     /// Range of its registers.
     fn range(&self) -> core::ops::Range<usize> {
         let first = self.offset as usize;
-        first..first.saturating_add(registers((self.degree as usize).min(DEGREE_MAX)))
+        let [values, slopes] = self.counts();
+        first..first.saturating_add(3 * values + 6 * slopes)
+    }
+
+    /// Registers of the values and of the gradients, within those of any representation.
+    fn counts(&self) -> [usize; 2] {
+        self.groups.map(|count| usize::from(count).min(GROUPS_MAX))
     }
 }
 
-/// Number of registers of a record of `degree`.
-pub(crate) const fn registers_of(degree: usize) -> usize {
-    registers(if degree > DEGREE_MAX { DEGREE_MAX } else { degree })
-}
-
 /// Writes coefficients and gradients, the latter in the unit of length `unit`, above 0, to the registers of
-/// one record. `None` if there are fewer than [`registers_of`].
-pub(crate) fn write(
-    out: &mut [[u16; 16]],
-    coefficients: &Coefficients,
-    gradients: &Gradients,
-    unit: f32,
-) -> Option<PooledRecord> {
-    let degree = coefficients.degree.min(DEGREE_MAX);
-    let (values, slopes) = (groups(degree), groups(gradient_degree(degree)));
-    let free = out.get_mut(..registers(degree))?;
-    let irradiance = coefficients.irradiance().to_array();
+/// one record. `None` if there are fewer than [`Representation::registers`].
+pub(crate) fn write(out: &mut [[u16; 16]], light: &Expansion, unit: f32) -> Option<PooledRecord> {
+    let representation = light.representation;
+    let [values, slopes] = representation.groups();
+    let count = [representation, representation.of_gradients()].map(Representation::count);
+    let free = out.get_mut(..representation.registers())?;
+    let irradiance = light.irradiance.to_array();
     let irradiance = irradiance.map(|value| if value > 0.0 && value.is_finite() { value } else { 0.0 });
     let (free_values, free_slopes) = free.split_at_mut(3 * values);
     let rows = free_values.chunks_exact_mut(values).zip(free_slopes.chunks_exact_mut(2 * slopes));
@@ -136,39 +204,40 @@ pub(crate) fn write(
         // A black or invalid channel stores zeros.
         let scale = libm::sqrtf(PI) / irradiance[channel];
         let scale = if scale > 0.0 && scale.is_finite() { scale } else { 0.0 };
-        store(row, degree, |k| scale * coefficients.values[channel][k]);
+        let own = light.values[channel].iter().map(|value| scale * value);
+        store(row, own.take(count[0]));
         for (axis, row) in pair.chunks_exact_mut(slopes).enumerate() {
-            store(row, gradient_degree(degree), |k| scale * unit * gradients[channel][k][axis]);
+            let own = light.gradients[channel].iter().map(|slope| scale * unit * slope[axis]);
+            store(row, own.take(count[1]));
         }
     }
-    Some(PooledRecord { irradiance, unit, offset: 0, degree: degree as u32 })
+    Some(PooledRecord { irradiance, unit, offset: 0, groups: [values as u16, slopes as u16] })
 }
 
 impl<'m> CoefficientPool<'m> {
-    /// Footprint of `records` records of `degree`.
-    pub fn footprint(records: usize, degree: usize) -> Footprint {
-        Footprint::default().slice::<[u16; 16]>(records.saturating_mul(registers(degree.min(DEGREE_MAX))))
+    /// Footprint of `records` records of `representation`.
+    pub fn footprint(records: usize, representation: Representation) -> Footprint {
+        Footprint::default().slice::<[u16; 16]>(records.saturating_mul(representation.registers()))
     }
 
-    /// Empty pool with memory for `records` records of `degree`.
+    /// Empty pool with memory for `records` records of `representation`.
     ///
     /// # Errors
     /// [`OutOfMemory`] if the arena has less than the footprint.
-    pub fn new(records: usize, degree: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let count = records.saturating_mul(registers(degree.min(DEGREE_MAX)));
+    pub fn new(
+        records: usize,
+        representation: Representation,
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
+        let count = records.saturating_mul(representation.registers());
         Ok(Self { registers: arena.slice(count)?, used: 0 })
     }
 
     /// Stores coefficients and gradients, the latter in the unit of length `unit`, above 0: the radius of the
     /// record. `None` without memory.
-    pub fn push(
-        &mut self,
-        coefficients: &Coefficients,
-        gradients: &Gradients,
-        unit: f32,
-    ) -> Option<PooledRecord> {
+    pub fn push(&mut self, light: &Expansion, unit: f32) -> Option<PooledRecord> {
         let offset = u32::try_from(self.used).ok()?;
-        let record = write(self.registers.get_mut(self.used..)?, coefficients, gradients, unit)?;
+        let record = write(self.registers.get_mut(self.used..)?, light, unit)?;
         self.used += record.range().len();
         Some(PooledRecord { offset, ..record })
     }
@@ -221,25 +290,18 @@ impl<'m> CoefficientPool<'m> {
         weights: [&Weights; 3],
         delta: Vec2,
     ) -> Rgb {
-        let degree = (record.degree as usize).min(DEGREE_MAX);
-        let (values, slopes) = (groups(degree), groups(gradient_degree(degree)));
+        let [values, slopes] = record.counts();
         let Some(rows) = self.registers.get(record.range()) else { return Rgb::ZERO };
-        let (of_values, of_slopes) = rows.split_at(3 * values);
+        let products = level.dispatch(OfRecord { rows, groups: [values, slopes], weights });
         let step = if record.unit > 0.0 { delta / record.unit } else { Vec2::ZERO };
         let mut reflected = [0.0; 3];
-        let rows = of_values.chunks_exact(values).zip(of_slopes.chunks_exact(2 * slopes));
-        for (channel, ((reflected, weights), (of_values, of_slopes))) in
-            reflected.iter_mut().zip(weights).zip(rows).enumerate()
+        for ((reflected, [own, x, y]), irradiance) in
+            reflected.iter_mut().zip(products).zip(record.irradiance)
         {
-            let (mut own, mut slope) = ([0.0], [0.0; 2]);
-            Dots { rows: of_values, weights: weights.0.get(..values).unwrap_or_default(), out: &mut own }
-                .compute(level);
-            Dots { rows: of_slopes, weights: weights.0.get(..slopes).unwrap_or_default(), out: &mut slope }
-                .compute(level);
-            let here = own[0].max(0.0);
-            let there = own[0] + step.dot(Vec2::from(slope));
+            let here = own.max(0.0);
+            let there = own + step.dot(Vec2::new(x, y));
             let within = there.max(EXTRAPOLATION[0] * here).min(EXTRAPOLATION[1] * here);
-            *reflected = record.irradiance[channel] * (1.0 / libm::sqrtf(PI)) * within;
+            *reflected = irradiance * (1.0 / libm::sqrtf(PI)) * within;
         }
         Rgb::from_array(reflected)
     }
@@ -266,11 +328,11 @@ impl<'m> CoefficientPool<'m> {
     }
 }
 
-/// Stores the numbers up to `degree` as finite half floats, zeros beyond.
-fn store(row: &mut [[u16; 16]], degree: usize, number: impl Fn(usize) -> f32) {
+/// Stores the numbers as finite half floats, then zeros.
+fn store(row: &mut [[u16; 16]], mut numbers: impl Iterator<Item = f32>) {
     const GREATEST: f32 = 65504.0;
-    for (k, entry) in row.as_flattened_mut().iter_mut().enumerate() {
-        let number = if k < count(degree) { number(k) } else { 0.0 };
+    for entry in row.as_flattened_mut() {
+        let number = numbers.next().unwrap_or(0.0);
         let finite = if number.is_nan() { 0.0 } else { number.clamp(-GREATEST, GREATEST) };
         *entry = from_f32(finite);
     }

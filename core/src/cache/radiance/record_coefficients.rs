@@ -1,5 +1,6 @@
 //! Coefficients beside the records of an irradiance cache: those of surfaces with served lobes have some.
 
+use super::basis::Representation;
 use super::pool::{CoefficientPool, PooledRecord};
 use super::served::ServedLobes;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -13,9 +14,9 @@ pub struct RecordCoefficients<'m> {
 }
 
 impl<'m> RecordCoefficients<'m> {
-    /// Footprint for `capacity` records of `degree`.
-    pub fn footprint(capacity: usize, degree: usize) -> Footprint {
-        CoefficientPool::footprint(capacity, degree).slice::<PooledRecord>(capacity)
+    /// Footprint for `capacity` records of `representation`.
+    pub fn footprint(capacity: usize, representation: Representation) -> Footprint {
+        CoefficientPool::footprint(capacity, representation).slice::<PooledRecord>(capacity)
     }
 
     /// Memory for `capacity` records that serve `lobes`.
@@ -23,7 +24,7 @@ impl<'m> RecordCoefficients<'m> {
     /// # Errors
     /// [`OutOfMemory`] if the arena has less than [`RecordCoefficients::footprint`].
     pub fn new(lobes: ServedLobes<'m>, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let pool = CoefficientPool::new(capacity, lobes.degree(), arena)?;
+        let pool = CoefficientPool::new(capacity, lobes.representation(), arena)?;
         Ok(Self { lobes, pool, of_record: arena.slice(capacity)? })
     }
 

@@ -7,17 +7,24 @@
 //! coat's transmittance T:
 //!
 //!   base · T(θ_o)/π ∫ L T(θ_i) cos dω = base · T(θ_o)/π Σ_d t_d λ_{d,0},   t_d = ∫ T Z_{d,0} cos dω.
+//!
+//! With spherical harmonics a lobe has the lowest order within the tolerance, and its coefficients are turned
+//! exactly from the frame of the point into that of the record (Křivánek et al. 2005): Σ c_k (R λ)_k = Σ (R⁻¹
+//! c)_k λ_k. With Zernike polynomials it has the degree of the records, and the viewer is moved.
 
+use super::basis::{Basis, DEGREE_MAX, Representation};
 use super::lobes::{Lobe, LobeTable};
+use super::mirrored_viewer;
 use super::pool::Weights;
-use super::zernike::{COUNT_MAX, DEGREE_MAX, index, values};
+use super::sh::ShRotation;
 use crate::Rgb;
 use crate::bsdf::{Bsdf, MicrofacetLobe};
+use crate::geometry::Frame;
 use crate::light::luminance;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::{Scene, Surface};
 use core::f32::consts::PI;
-use glam::{Vec2, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 
 /// Maximum number of distinct indices of refraction of coats; coats of further ones are left to paths.
 const INDICES_MAX: usize = 4;
@@ -42,25 +49,38 @@ const GAUSS: [[f32; 2]; NODES] = [
     [0.980_144_9, 0.050_614_27],
 ];
 
-/// Number of zonal functions.
-const ZONAL: usize = DEGREE_MAX / 2 + 1;
+/// Number of zonal functions of any basis.
+const ZONAL: usize = DEGREE_MAX + 1;
 
 /// Settings of the lobes that records serve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeSettings {
+    /// Basis of the coefficients.
+    pub basis: Basis,
     /// Expected error of a served lobe, relative to all that leaves the surface.
     pub tolerance: f32,
-    /// Largest degree of the records, at most [`DEGREE_MAX`].
+    /// Largest degree of the records, at most [`Basis::degree_max`].
     pub degree: usize,
 }
 
 impl Default for LobeSettings {
     fn default() -> Self {
-        Self { tolerance: 0.02, degree: 6 }
+        Self::of(Basis::default())
     }
 }
 
 impl LobeSettings {
+    /// Usual settings with `basis`.
+    pub const fn of(basis: Basis) -> Self {
+        Self { basis, tolerance: 0.02, degree: basis.usual_degree() }
+    }
+
+    /// Representation of records at most.
+    pub fn representation(&self) -> Representation {
+        let Self { basis, degree, .. } = *self;
+        Representation { basis, degree: degree.min(basis.degree_max()) }
+    }
+
     /// Strata along a side of the hemisphere that determine coefficients of this degree.
     pub fn strata(&self) -> usize {
         match self.degree {
@@ -86,9 +106,9 @@ pub struct ServedLobes<'m> {
     schlick: Option<LobeTable<'m>>,
     dielectric: [Option<(f32, LobeTable<'m>)>; INDICES_MAX],
     tolerance: f32,
-    degree: usize,
+    representation: Representation,
     census: LobeCensus,
-    /// Z_{d,0} at the nodes, times 2π cos and the weight.
+    /// Functions with m = 0 at the nodes, times 2π cos and the weight.
     zonal: [[f32; ZONAL]; NODES],
 }
 
@@ -100,7 +120,7 @@ pub(crate) struct ServedLobe<'m> {
     of: MicrofacetLobe,
     /// Zonal coefficients of a base that no fit describes; zero otherwise.
     base: [[f32; ZONAL]; 3],
-    degree: usize,
+    representation: Representation,
 }
 
 /// Index of refraction and whether it is one of a dielectric coat, of a surface whose lobe may be served.
@@ -133,10 +153,10 @@ fn has_schlick(scene: &Scene) -> bool {
 }
 
 impl<'m> ServedLobes<'m> {
-    /// Footprint of the tables that `scene` needs.
-    pub fn footprint(scene: &Scene) -> Footprint {
+    /// Footprint of the tables of a basis that `scene` needs.
+    pub fn footprint(scene: &Scene, basis: Basis) -> Footprint {
         let tables = indices(scene).iter().flatten().count() + usize::from(has_schlick(scene));
-        (0..tables).fold(Footprint::default(), |sum, _| sum.and(LobeTable::footprint()))
+        (0..tables).fold(Footprint::default(), |sum, _| sum.and(LobeTable::footprint(basis)))
     }
 
     /// Tables for `scene`. `None` if records can serve none of its lobes.
@@ -148,21 +168,23 @@ impl<'m> ServedLobes<'m> {
         settings: &LobeSettings,
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
-        let schlick = if has_schlick(scene) { Some(LobeTable::build(arena)?) } else { None };
+        let representation @ Representation { basis, .. } = settings.representation();
+        let schlick = if has_schlick(scene) { Some(LobeTable::build(basis, arena)?) } else { None };
         let mut dielectric = [None; INDICES_MAX];
         for (table, eta) in dielectric.iter_mut().zip(indices(scene)) {
             if let Some(eta) = eta {
-                *table = Some((eta, LobeTable::build_dielectric(eta, arena)?));
+                *table = Some((eta, LobeTable::build_dielectric(basis, eta, arena)?));
             }
         }
         let mut zonal = [[0.0; ZONAL]; NODES];
         for (zonal, [cos, weight]) in zonal.iter_mut().zip(GAUSS) {
-            let values = values(DEGREE_MAX, [libm::sqrtf(1.0 - cos * cos), 0.0]);
-            *zonal = core::array::from_fn(|j| 2.0 * PI * cos * weight * values[index(2 * j, 0)]);
+            let values = basis.values(Vec3::new(libm::sqrtf(1.0 - cos * cos), 0.0, cos));
+            for (zonal, k) in zonal.iter_mut().zip(zonal_functions(basis)) {
+                *zonal = 2.0 * PI * cos * weight * values[k];
+            }
         }
-        let (tolerance, most) = (settings.tolerance, settings.degree.min(DEGREE_MAX));
-        let census = LobeCensus::default();
-        let mut served = Self { schlick, dielectric, tolerance, degree: most, census, zonal };
+        let (tolerance, census) = (settings.tolerance, LobeCensus::default());
+        let mut served = Self { schlick, dielectric, tolerance, representation, census, zonal };
         let mut degree = None;
         for material in scene.materials.iter().filter(|material| material.surface.may_be_rough()) {
             let of_material = served.degree_of(scene, &material.surface);
@@ -172,7 +194,7 @@ impl<'m> ServedLobes<'m> {
             *count += 1;
         }
         let Some(degree) = degree else { return Ok(None) };
-        served.degree = degree;
+        served.representation.degree = degree;
         Ok(Some(served))
     }
 
@@ -190,7 +212,7 @@ impl<'m> ServedLobes<'m> {
             _ => return None,
         };
         if inputs.contains(&true) {
-            return Some(self.degree);
+            return Some(self.representation.degree);
         }
         let material = crate::scene::Material { surface: *surface, ..crate::scene::Material::GREY };
         let bsdf = Bsdf::at::<crate::bsdf::All>(scene, &material, Vec2::ZERO, true);
@@ -214,14 +236,18 @@ impl<'m> ServedLobes<'m> {
         let tint = luminance(of.tint);
         let base = luminance(bsdf.base_factor(cos) * bsdf.transmittance_at(MEAN_COSINE)) * PI;
         let base = if tint > 0.0 { base / tint } else { f32::INFINITY };
-        let degree = lobe.degree(luminance(of.f0), base, self.tolerance, self.degree);
+        let degree = lobe.degree(luminance(of.f0), base, self.tolerance, self.representation.degree);
         Some((of, (table, lobe), degree))
     }
 
     /// Lobe of `bsdf` for a viewer at the cosine `cos`, if records serve it.
     pub(crate) fn find(&self, bsdf: &Bsdf, cos: f32) -> Option<ServedLobe<'m>> {
         let (of, (table, lobe), degree) = self.needed(bsdf, cos)?;
-        degree?;
+        let needed = degree?;
+        let representation = match self.representation.basis {
+            Basis::Zernike => self.representation,
+            basis => Representation { basis, degree: needed },
+        };
         let mut base = [[0.0; ZONAL]; 3];
         let factor = bsdf.base_factor(cos);
         if factor != Rgb::ZERO && !bsdf.has_coated_base() {
@@ -232,7 +258,7 @@ impl<'m> ServedLobes<'m> {
                 }
             }
         }
-        Some(ServedLobe { table, lobe, of, base, degree: self.degree })
+        Some(ServedLobe { table, lobe, of, base, representation })
     }
 
     /// True if records serve the lobe of `bsdf` for a viewer at the cosine `cos`.
@@ -245,9 +271,9 @@ impl<'m> ServedLobes<'m> {
         coat_of(surface).is_some()
     }
 
-    /// Degree of the records.
-    pub fn degree(&self) -> usize {
-        self.degree
+    /// Representation of the records.
+    pub fn representation(&self) -> Representation {
+        self.representation
     }
 
     /// Numbers of materials with a rough reflection.
@@ -259,23 +285,56 @@ impl<'m> ServedLobes<'m> {
 /// Cosine at which the transmittance of a coat stands for its mean.
 const MEAN_COSINE: f32 = 0.7;
 
+/// Numbers of the functions with m = 0.
+fn zonal_functions(basis: Basis) -> impl Iterator<Item = usize> {
+    (0..=basis.degree_max()).step_by(basis.step()).map(move |degree| basis.index(degree, 0))
+}
+
 impl ServedLobe<'_> {
-    /// Weights of the coefficients of each channel for a viewer in the local direction `viewer` of the
-    /// record. A viewer at another angle than that of the lobe is one of a turned normal: the radiance is
-    /// then that for the former angle, times the ratio of the albedos. `None` if records do not serve it.
-    pub(crate) fn weights(&self, viewer: Vec3, is_turned: bool) -> Option<[Weights; 3]> {
+    /// Weights of the coefficients of each channel of a record with the tangent frame `record`, for a viewer
+    /// in the direction `viewer` of a point with the normal `normal`. `None` if the record does not serve it.
+    pub(crate) fn weights(&self, record: &Frame, normal: Vec3, viewer: Vec3) -> Option<[Weights; 3]> {
+        let is_turned = normal != record.normal;
+        match self.representation.basis {
+            Basis::Zernike => {
+                let viewer = record.to_local(mirrored_viewer(viewer, normal, record.normal)?);
+                self.weights_for(viewer, is_turned)
+            }
+            Basis::SphericalHarmonics if is_turned => {
+                let own = Frame::from_normal(normal);
+                let axes = [own.tangent, own.bitangent, own.normal].map(|axis| record.to_local(axis));
+                let rotation =
+                    ShRotation::new(&Mat3::from_cols(axes[0], axes[1], axes[2]), self.representation.degree);
+                let unturned = self.channels(&self.lobe, own.to_local(viewer));
+                let count = self.representation.count();
+                Some(unturned.map(|weights| Weights::of(count, rotation.apply(weights.all()).into_iter())))
+            }
+            Basis::SphericalHarmonics => self.weights_for(record.to_local(viewer), false),
+        }
+    }
+
+    /// Weights for a viewer in the local direction `viewer` of the record. A viewer at another angle than
+    /// that of the lobe is one of a turned normal: the radiance is then that for the former angle, times the
+    /// ratio of the albedos. `None` if records do not serve it.
+    fn weights_for(&self, viewer: Vec3, is_turned: bool) -> Option<[Weights; 3]> {
         let turned = if is_turned { Some(self.table.lobe(viewer.z, self.of.alpha)?) } else { None };
-        let lobe = turned.as_ref().unwrap_or(&self.lobe);
+        Some(self.channels(turned.as_ref().unwrap_or(&self.lobe), viewer))
+    }
+
+    /// Weights of each channel for the lobe of a viewer in the local direction `viewer`, with the albedo of
+    /// the lobe of the surface.
+    fn channels(&self, lobe: &Lobe, viewer: Vec3) -> [Weights; 3] {
         let coefficients = lobe.turned(viewer.truncate());
         let (f0, tint) = (self.of.f0.to_array(), self.of.tint.to_array());
-        Some(core::array::from_fn(|channel| {
+        let count = self.representation.count();
+        core::array::from_fn(|channel| {
             let ratio = self.lobe.albedo(f0[channel]) / lobe.albedo(f0[channel]);
             let factor = tint[channel] * if ratio.is_finite() { ratio } else { 0.0 };
-            let mut weights: [f32; COUNT_MAX] = coefficients.of(f0[channel]).map(|weight| factor * weight);
-            for (j, zonal) in self.base[channel].iter().enumerate() {
-                weights[index(2 * j, 0)] += zonal;
-            }
-            Weights::new(&weights, self.degree)
-        }))
+            let of_lobe = coefficients.each(f0[channel]).map(|weight| factor * weight);
+            let mut weights = Weights::of(count, of_lobe);
+            let functions = zonal_functions(self.representation.basis).take_while(|&k| k < count);
+            functions.zip(self.base[channel]).for_each(|(k, zonal)| weights.add(k, zonal));
+            weights
+        })
     }
 }

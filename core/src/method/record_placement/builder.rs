@@ -1,7 +1,7 @@
 //! A cache under construction: its records, and the sweeps that add to them.
 
 use crate::cache::irradiance::{IrradianceCache, Record};
-use crate::cache::radiance::{PooledRecord, RecordCoefficients, ServedLobes};
+use crate::cache::radiance::{PooledRecord, RecordCoefficients, Representation, ServedLobes};
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::cached::gather::GatherPoint;
@@ -45,20 +45,20 @@ pub struct CacheBuilder<'m> {
 }
 
 impl<'m> CacheBuilder<'m> {
-    /// Bytes for `capacity` records, with coefficients up to `degree` if there is one.
-    pub fn footprint(capacity: usize, degree: Option<usize>) -> Footprint {
+    /// Bytes for `capacity` records, with coefficients if they have a representation.
+    pub fn footprint(capacity: usize, representation: Option<Representation>) -> Footprint {
         let records =
             IrradianceCache::footprint(capacity).slice::<f32>(capacity).slice::<GatherPoint>(capacity);
-        match degree {
-            Some(degree) => records.and(RecordCoefficients::footprint(capacity, degree)),
+        match representation {
+            Some(representation) => records.and(RecordCoefficients::footprint(capacity, representation)),
             None => records,
         }
     }
 
     /// Number of records that fit into `bytes`.
-    pub fn capacity_of(bytes: usize, degree: Option<usize>) -> usize {
+    pub fn capacity_of(bytes: usize, representation: Option<Representation>) -> usize {
         let mut capacity = IrradianceCache::capacity_of(bytes);
-        while capacity > 0 && Self::footprint(capacity, degree).bytes() > bytes {
+        while capacity > 0 && Self::footprint(capacity, representation).bytes() > bytes {
             capacity -= 1 + capacity / 64;
         }
         capacity

@@ -13,7 +13,7 @@ pub use builder::CacheBuilder;
 use super::executor::{Executor, Passed};
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CellFlux, metric};
-use crate::cache::radiance::{ServedLobes, StrataTables, registers_of};
+use crate::cache::radiance::{GatherTables, Representation, ServedLobes};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::cached::gather::{GatherPoint, Gathering};
 use crate::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
@@ -88,16 +88,16 @@ pub struct LobeGathering<'m> {
     lobes: ServedLobes<'m>,
     /// Tables for the number of strata.
     flux: CellFlux<'m>,
-    strata: StrataTables<'m>,
+    strata: GatherTables<'m>,
     /// Registers of the points between two commits.
     registers: &'m mut [[u16; 16]],
 }
 
 impl<'m> LobeGathering<'m> {
-    /// Bytes for n × n strata and coefficients up to `degree`.
-    pub fn footprint(n: usize, degree: usize) -> Footprint {
-        let tables = CellFlux::footprint(n).and(StrataTables::footprint(n, degree));
-        tables.slice::<[u16; 16]>(MOST_POINTS * registers_of(degree))
+    /// Bytes for n × n strata and coefficients of `representation`.
+    pub fn footprint(n: usize, representation: Representation) -> Footprint {
+        let tables = CellFlux::footprint(n).and(GatherTables::footprint(n, representation));
+        tables.slice::<[u16; 16]>(MOST_POINTS * representation.registers())
     }
 
     /// Gathering for `lobes` with n × n strata.
@@ -105,9 +105,9 @@ impl<'m> LobeGathering<'m> {
     /// # Errors
     /// [`OutOfMemory`] where `arena` has less than [`LobeGathering::footprint`].
     pub fn new(lobes: ServedLobes<'m>, n: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let degree = lobes.degree();
-        let (flux, strata) = (CellFlux::build(n, arena)?, StrataTables::build(n, degree, arena)?);
-        Ok(Self { lobes, flux, strata, registers: arena.slice(MOST_POINTS * registers_of(degree))? })
+        let of = lobes.representation();
+        let (flux, strata) = (CellFlux::build(n, arena)?, GatherTables::build(n, of, arena)?);
+        Ok(Self { lobes, flux, strata, registers: arena.slice(MOST_POINTS * of.registers())? })
     }
 
     /// Lobes that records serve.
@@ -278,7 +278,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
             }
             None => (None, Default::default()),
         };
-        let stride = lobes.map_or(1, |(_, strata)| registers_of(strata.degree()));
+        let stride = lobes.map_or(1, |(_, strata)| strata.representation().registers());
         let mut staged = registers.chunks_mut(stride);
         let pieces = points.iter().zip(&mut found).map(|piece| (piece, staged.next().unwrap_or_default()));
         let passed = executor.pass(pieces, |i, ((point, found), registers), worker| {

@@ -11,8 +11,7 @@ use crate::bvh::Coherence;
 use crate::cache::irradiance::{
     CellFlux, Hemisphere, Metric, OVERHANG_RADIUS_FACTOR, QueryPoint, Record, metric, validity,
 };
-use crate::cache::radiance::derivatives::border_flux;
-use crate::cache::radiance::{Coefficients, PooledRecord, StrataTables, write};
+use crate::cache::radiance::{GatherTables, PooledRecord};
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
@@ -159,7 +158,7 @@ pub(in crate::transport) struct HemisphereSamples<'m> {
     limited: &'m mut [[f32; 3]],
     pub(in crate::transport) inverse_distance: &'m mut [f32],
     pub(in crate::transport) directions: &'m mut [[f32; 3]],
-    /// Local normals of the hits; empty if the metric does not need them.
+    /// Local normals of the hits; empty if neither the metric nor the coefficients need them.
     normals: &'m mut [[f32; 3]],
     /// Number of strata that see an emitter or the environment.
     shining: u32,
@@ -172,7 +171,12 @@ impl<'m> HemisphereSamples<'m> {
         triples.and(triples).and(triples).and(triples).slice::<f32>(strata)
     }
 
-    pub(super) fn new(n: usize, metric: Metric, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub(super) fn new(
+        n: usize,
+        metric: Metric,
+        needs_normals: bool,
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
         let strata = n.saturating_mul(n);
         let strata_if = |is_needed| if is_needed { strata } else { 0 };
         Ok(Self {
@@ -181,7 +185,7 @@ impl<'m> HemisphereSamples<'m> {
             inverse_distance: arena.slice(strata)?,
             directions: arena.slice(strata)?,
             limited: arena.slice(strata_if(metric.limits_radiance()))?,
-            normals: arena.slice(strata_if(metric.takes_normals()))?,
+            normals: arena.slice(strata_if(needs_normals || metric.takes_normals()))?,
             shining: 0,
         })
     }
@@ -239,14 +243,15 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         place: &GatherPoint,
         number: u32,
         gathering: &Gathering,
-        coefficients: Option<(&StrataTables, &mut [[u16; 16]])>,
+        coefficients: Option<(&GatherTables, &mut [[u16; 16]])>,
         scratch: &mut Arena,
         counters: &mut Counters,
     ) -> Result<Option<(Record, PooledRecord)>, OutOfMemory> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
         let mut arena = scratch.scratch();
-        let mut strata = HemisphereSamples::new(n, metric.metric, &mut arena)?;
+        let needs_normals = coefficients.as_ref().is_some_and(|(tables, _)| tables.needs_normals());
+        let mut strata = HemisphereSamples::new(n, metric.metric, needs_normals, &mut arena)?;
         let frame = Frame::from_normal(place.normal());
         let generate = |i| self.generate_gather_ray(place, &frame, (number, i), n);
         self.trace_strata(&frame, &mut strata, &mut arena, generate, counters)?;
@@ -269,7 +274,8 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         self.find_boundary(&mut record, place, &frame, &strata, counters);
         self.add_overhangs(&mut record, place);
         let pooled = coefficients.and_then(|(tables, out)| {
-            self.write_coefficients(tables, &strata.hemisphere()?, reach.gradient_scale, &record, out)
+            let scales = (reach.gradient_scale, record.radii[0]);
+            tables.write(self.context.level, &strata.hemisphere()?, scales, out)
         });
         Ok(Some((record, pooled.unwrap_or_default())))
     }
@@ -313,24 +319,6 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             first += count;
         }
         Ok(())
-    }
-
-    /// Projects the light of `hemisphere` and writes its coefficients and their gradients, times
-    /// `gradient_scale`, to `out`.
-    fn write_coefficients(
-        &self,
-        tables: &StrataTables,
-        hemisphere: &Hemisphere,
-        gradient_scale: f32,
-        record: &Record,
-        out: &mut [[u16; 16]],
-    ) -> Option<PooledRecord> {
-        let level = self.context.level;
-        let coefficients = Coefficients::project(level, tables, hemisphere)?;
-        let mut gradients = border_flux(level, tables, hemisphere)?.gradients;
-        let scaled = gradients.as_flattened_mut().as_flattened_mut();
-        scaled.iter_mut().for_each(|value| *value *= gradient_scale);
-        write(out, &coefficients, &gradients, record.radii[0])
     }
 
     /// Local direction of ray `i` of gather `number` with n × n strata, the ray, and its path.

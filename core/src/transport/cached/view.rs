@@ -203,7 +203,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         };
         let place = &place.point;
         let mut arena = scratch.scratch();
-        let mut strata = HemisphereSamples::new(SIDE, gathering.metric.metric, &mut arena)?;
+        let mut strata = HemisphereSamples::new(SIDE, gathering.metric.metric, false, &mut arena)?;
         let frame = Frame::from_normal(place.normal());
         let pixel = NO_PIXEL | VIEWS | number;
         let point_of = |stratum: usize| {

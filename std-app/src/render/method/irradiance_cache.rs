@@ -242,8 +242,8 @@ impl<'m, F: Features> Cached<'m, F> {
             _ => "the light of wide lobes is interpolated",
         };
         Finding::new("radiance_records", Used, reason)
-            .with("basis", Value::Name("zernike"))
-            .with("degree", Value::Count(lobes.degree() as u64))
+            .with("basis", Value::Name(lobes.representation().basis.name()))
+            .with("degree", Value::Count(lobes.representation().degree as u64))
             .with("tolerance", Value::Number(self.setup.settings.lobes.tolerance.into()))
             .with("rays_per_record", Value::Count(gathering.rays() as u64))
             .with("records", Value::Count(caches.iter().map(|cache| with_lobes(cache)).sum()))
@@ -379,7 +379,7 @@ fn scratch<F: Features>(cache: &CacheSettings, has_caustics: bool) -> Footprint 
 /// Bytes to leave when caustic photons take memory: for tables, for the fewest records of each cache, and for
 /// the audit.
 fn later(cache: &CacheSettings, scene: &Scene) -> usize {
-    let records = CacheBuilder::footprint(cache.fewest, cache.degree()).bytes().saturating_mul(2);
+    let records = CacheBuilder::footprint(cache.fewest, cache.representation()).bytes().saturating_mul(2);
     let tables = cache.gathering_footprint().and(cache.lobe_footprint(scene)).bytes();
     records.saturating_add(tables).saturating_add(cache.reserve)
 }

@@ -16,7 +16,7 @@ mod properties;
 mod wrong;
 
 pub use cache_settings::CacheSettings;
-pub use halflight_core::cache::radiance::LobeSettings;
+pub use halflight_core::cache::radiance::{Basis, LobeSettings};
 pub use halflight_core::method::PhotonSettings;
 pub use photon_view::{MapView, PhotonView};
 pub use properties::Method;

@@ -7,10 +7,10 @@ use crate::memory::lines;
 use glam::{DVec2, DVec3, Vec2, Vec3Swizzles};
 use halflight_core::Level;
 use halflight_core::cache::irradiance::Hemisphere;
-use halflight_core::cache::radiance::StrataTables;
 use halflight_core::cache::radiance::derivatives::{Gradients, border_flux, displaced, unoccluded};
 use halflight_core::cache::radiance::lobes::LobeTable;
 use halflight_core::cache::radiance::zernike::{COUNT_MAX, count};
+use halflight_core::cache::radiance::{Basis, StrataTables};
 use halflight_core::memory::{Arena, OutOfMemory};
 use halflight_core::sampling::warp::cosine_hemisphere;
 
@@ -202,7 +202,8 @@ fn lobes(table: &LobeTable) -> Vec<[f32; COUNT_MAX]> {
     let viewers = [20.0f32, 50.0].into_iter().flat_map(|angle| (0..8).map(move |turn| (angle, turn)));
     let lobe = |(angle, turn): (f32, u16)| {
         let towards = Vec2::from_angle(f32::from(turn) * core::f32::consts::FRAC_PI_4);
-        Some(table.lobe(angle.to_radians().cos(), 0.3)?.turned(towards).of(1.0))
+        let weights = table.lobe(angle.to_radians().cos(), 0.3)?.turned(towards).of(1.0);
+        weights.first_chunk().copied()
     };
     viewers.filter_map(lobe).collect()
 }
@@ -211,8 +212,8 @@ fn lobes(table: &LobeTable) -> Vec<[f32; COUNT_MAX]> {
 pub(super) fn errors(room: &Room, strata: usize) -> Result<GradientError, OutOfMemory> {
     let mut memory = lines(StrataTables::footprint(strata, DEGREE))?;
     let tables = StrataTables::build(strata, DEGREE, &mut Arena::over(&mut memory))?;
-    let mut memory = lines(LobeTable::footprint())?;
-    let lobes = lobes(&LobeTable::build(&mut Arena::over(&mut memory))?);
+    let mut memory = lines(LobeTable::footprint(Basis::Zernike))?;
+    let lobes = lobes(&LobeTable::build(Basis::Zernike, &mut Arena::over(&mut memory))?);
     let mut random = Random(17);
     let (mut gradient, mut hessian, mut leaving) = <([Squares; 4], [Squares; 4], [Squares; 3])>::default();
     for _ in 0..RECEIVERS {

@@ -138,10 +138,15 @@ impl Room {
         loop {
             let at = DVec3::new(random.unit(), random.unit(), 0.0) * (self.size - 0.04)
                 + DVec3::new(0.02, 0.02, 0.0);
-            if !self.cuboids.iter().any(|cuboid| cuboid.holds(at)) {
+            if self.is_free(at) {
                 return at.with_z(0.0);
             }
         }
+    }
+
+    /// True for a point outside of all cuboids.
+    pub(super) fn is_free(&self, at: DVec3) -> bool {
+        !self.cuboids.iter().any(|cuboid| cuboid.holds(at))
     }
 
     /// Radiance reflected towards `from` along the unit vector `w`, and the distance.
@@ -167,6 +172,22 @@ impl Room {
             }
         }
         (albedo * irradiance / core::f64::consts::PI, t)
+    }
+
+    /// Radiance, distance and normal of the surface that is seen along the unit vector `w`.
+    pub(super) fn light(&self, from: DVec3, w: DVec3) -> (f64, f64, DVec3) {
+        let (radiance, distance) = self.radiance(from, w);
+        (radiance, distance, self.hit(from, w).normal)
+    }
+
+    /// Length along x.
+    pub(super) fn width(&self) -> f64 {
+        self.size.x
+    }
+
+    /// Half of the diagonal.
+    pub(super) fn extent(&self) -> f64 {
+        0.5 * self.size.length()
     }
 
     /// True if a cuboid hides the end of `segment`.

@@ -3,18 +3,15 @@
 use super::*;
 use crate::bsdf::{All, Bsdf, Conductor, Glossy, Plastic};
 use crate::cache::irradiance::SECTORS;
-use crate::cache::radiance::{
-    Coefficients, LobeSettings, RecordCoefficients, ServedLobes, Sky, registers_of, with_tables, write,
-};
+use crate::cache::radiance::{Basis, GatherTables, LobeSettings, RecordCoefficients, ServedLobes, Sky};
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Line};
 use crate::sampling::warp::cosine_hemisphere;
 use crate::scene::{Camera, Material, Mesh, Scene, Surface};
 use std::vec;
 
-/// Strata along a side, and degree of the coefficients.
+/// Strata along a side.
 const N: usize = 32;
-const DEGREE: usize = 6;
 
 fn with_served(settings: &LobeSettings, surfaces: &[Surface], work: impl FnOnce(Option<&ServedLobes>)) {
     let materials: vec::Vec<_> =
@@ -27,7 +24,7 @@ fn with_served(settings: &LobeSettings, surfaces: &[Surface], work: impl FnOnce(
         environment: None,
         camera: Camera::look_at(Vec3::ZERO, Vec3::Z, Vec3::Y, 40.0),
     };
-    let mut lines = vec![Line([0; 64]); ServedLobes::footprint(&scene).bytes() / 64];
+    let mut lines = vec![Line([0; 64]); ServedLobes::footprint(&scene, settings.basis).bytes() / 64];
     let served = ServedLobes::build(&scene, settings, &mut Arena::over(&mut lines)).unwrap();
     work(served.as_ref());
 }
@@ -49,19 +46,18 @@ fn coat(roughness: f32, ior: Option<f32>) -> Surface {
 /// Record of `sky` at the origin with the normal z.
 fn with_cache(sky: &Sky, served: &ServedLobes, work: impl FnOnce(&IrradianceCache)) {
     let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE };
-    let footprint = IrradianceCache::footprint(2).and(RecordCoefficients::footprint(2, DEGREE));
+    let of = served.representation();
+    let footprint = IrradianceCache::footprint(2).and(RecordCoefficients::footprint(2, of));
     let mut lines = vec![Line([0; 64]); footprint.bytes() / 64];
     let mut arena = Arena::over(&mut lines);
     let cache = IrradianceCache::new(&bounds, 2, &mut arena).unwrap();
     let coefficients = RecordCoefficients::new(*served, 2, &mut arena).unwrap();
     let mut cache = cache.with_coefficients(Some(coefficients));
-    let light = with_tables(N, DEGREE, |tables| {
-        Coefficients::project(Level::detect(), tables, &sky.hemisphere()).unwrap()
-    });
+    let hemisphere = sky.hemisphere();
     let record = Record {
         normal: [0.0, 0.0, 1.0],
         axis: [1.0, 0.0, 0.0],
-        irradiance: light.irradiance().to_array(),
+        irradiance: hemisphere.irradiance().to_array(),
         radii: [0.5; 2],
         overlap: 1.0,
         reach: 0.5,
@@ -69,8 +65,10 @@ fn with_cache(sky: &Sky, served: &ServedLobes, work: impl FnOnce(&IrradianceCach
         free: [u8::MAX; SECTORS],
         ..Record::default()
     };
-    let mut registers = [[0; 16]; registers_of(DEGREE)];
-    let pooled = write(&mut registers, &light, &[[[0.0; 2]; 45]; 3], 0.5).unwrap();
+    let mut lines = vec![Line([0; 64]); GatherTables::footprint(N, of).bytes() / 64];
+    let tables = GatherTables::build(N, of, &mut Arena::over(&mut lines)).unwrap();
+    let mut registers = vec![[0; 16]; of.registers()];
+    let pooled = tables.write(Level::detect(), &hemisphere, (0.0, 0.5), &mut registers).unwrap();
     // A record without coefficients is not asked.
     assert!(cache.insert(record));
     assert!(cache.insert_with(record, Some((&pooled, &registers))));
@@ -173,6 +171,33 @@ fn light_of_the_span_is_reflected_as_by_brute_force() {
     });
 }
 
+/// Spherical harmonics reflect light that is dark at the horizon as by brute force, over turned normals as
+/// well: the rotation is exact, and little of such light is below the horizon of the record.
+#[test]
+fn spherical_harmonics_reflect_as_by_brute_force_over_turned_normals() {
+    let light = |w: [f32; 3]| w[2].max(0.0) * w[2] * (1.0 + 0.5 * w[0] - 0.3 * w[1]);
+    let surfaces = [metal(0.3f32.sqrt()), coat(0.5, Some(1.5))];
+    let sky = Sky::new(N, light);
+    with_served(&LobeSettings::of(Basis::SphericalHarmonics), &surfaces, |served| {
+        let served = served.unwrap();
+        assert_eq!(served.representation().basis, Basis::SphericalHarmonics);
+        with_cache(&sky, served, |cache| {
+            // Both have no base with a light of its own.
+            for bsdf in [bsdfs()[0], bsdfs()[3]] {
+                for (degrees, normal) in [10.0, 45.0].into_iter().flat_map(|degrees| {
+                    [Vec3::Z, Vec3::new(0.1, -0.05, 1.0).normalize()].map(|normal| (degrees, normal))
+                }) {
+                    let frame = Frame::from_normal(normal);
+                    let found = reflected(cache, &bsdf, normal, frame.to_world(viewer(degrees))).unwrap();
+                    let local = |w: [f32; 3]| light(frame.to_world(w.into()).to_array());
+                    let off = (found / brute(&bsdf, viewer(degrees), local) - 1.0).abs();
+                    assert!(off.max_element() < 0.02, "{bsdf:?} at {degrees} {normal}: {off}");
+                }
+            }
+        });
+    });
+}
+
 #[test]
 fn narrow_and_smooth_lobes_are_left_to_paths() {
     let settings = LobeSettings::default();
@@ -181,7 +206,7 @@ fn narrow_and_smooth_lobes_are_left_to_paths() {
     with_served(&settings, &[metal(0.55), metal(0.2), coat(0.6, Some(1.5))], |served| {
         let served = served.unwrap();
         assert_eq!((served.census().served, served.census().left), (2, 1));
-        assert!((4..=6).contains(&served.degree()));
+        assert!((4..=6).contains(&served.representation().degree));
         let metal = |alpha| Bsdf::Conductor(Conductor { f0: Rgb::splat(0.9), alpha });
         assert!(served.serves(&metal(0.3), 0.8) && !served.serves(&metal(0.16), 0.8));
         assert!(!served.serves(&metal(0.3), 0.1));
@@ -190,7 +215,7 @@ fn narrow_and_smooth_lobes_are_left_to_paths() {
         assert!(served.serves(&of_index(1.5), 0.8) && !served.serves(&of_index(1.6), 0.8));
     });
     // Rough surfaces need fewer coefficients.
-    with_served(&settings, &[metal(0.9)], |served| assert!(served.unwrap().degree() <= 3));
+    with_served(&settings, &[metal(0.9)], |served| assert!(served.unwrap().representation().degree <= 3));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::*;
 use crate::cache::radiance::derivatives::border_flux;
 use crate::cache::radiance::rooms::{Sky, with_tables};
+use crate::cache::radiance::zernike::{COUNT_MAX, count};
 use crate::memory::Line;
 use std::vec;
 
@@ -21,10 +22,14 @@ fn lobe() -> [f32; COUNT_MAX] {
     core::array::from_fn(|k| 0.4 / (1.0 + k as f32))
 }
 
+fn of(degree: usize) -> Representation {
+    Representation { basis: Basis::Zernike, degree }
+}
+
 fn with_pool<T>(records: usize, degree: usize, work: impl FnOnce(&mut CoefficientPool) -> T) -> T {
-    let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(records, degree).bytes() / 64];
+    let mut lines = vec![Line([0; 64]); CoefficientPool::footprint(records, of(degree)).bytes() / 64];
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
-    work(&mut CoefficientPool::new(records, degree, &mut arena).unwrap())
+    work(&mut CoefficientPool::new(records, of(degree), &mut arena).unwrap())
 }
 
 #[test]
@@ -35,15 +40,15 @@ fn half_floats_reflect_what_f32_reflects() {
         for scale in [1.0, 1e-12, 1e12] {
             let ((light, gradients), lobe) = (light(degree, scale), lobe());
             with_pool(1, degree, |pool| {
-                let record = pool.push(&light, &gradients, 0.05).unwrap();
+                let record = pool.push(&Expansion::zernike(&light, &gradients), 0.05).unwrap();
                 for delta in [Vec2::ZERO, Vec2::new(0.02, -0.03)] {
-                    let weights = Weights::new(&lobe, degree);
+                    let weights = Weights::new(&lobe[..count(degree)]);
                     let found = pool.reflected(Level::detect(), &record, &weights, delta).to_array();
                     for channel in 0..3 {
                         let mut wanted = 0.0;
                         for k in 0..count(degree) {
                             let slope = Vec2::from(gradients[channel][k]).dot(delta);
-                            let slope = if k < count(gradient_degree(degree)) { slope } else { 0.0 };
+                            let slope = if k < of(degree).of_gradients().count() { slope } else { 0.0 };
                             wanted += lobe[k] * (light.values[channel][k] + slope);
                         }
                         let off = (found[channel] - wanted).abs() / wanted;
@@ -57,10 +62,11 @@ fn half_floats_reflect_what_f32_reflects() {
 
 #[test]
 fn lookups_have_the_same_bits_on_every_level_and_in_a_mean() {
-    let ((light, gradients), weights) = (light(6, 1.0), Weights::new(&lobe(), 6));
+    let ((light, gradients), weights) = (light(6, 1.0), Weights::new(&lobe()[..count(6)]));
     with_pool(3, 6, |pool| {
-        let records = [0.05, 0.1, 0.2].map(|unit| pool.push(&light, &gradients, unit).unwrap());
-        assert!(pool.push(&light, &gradients, 0.1).is_none());
+        let records =
+            [0.05, 0.1, 0.2].map(|unit| pool.push(&Expansion::zernike(&light, &gradients), unit).unwrap());
+        assert!(pool.push(&Expansion::zernike(&light, &gradients), 0.1).is_none());
         assert_eq!(pool.used() * 32, 3 * 384);
         let delta = Vec2::new(0.01, 0.02);
         let of = |level, record| pool.reflected(level, record, &weights, delta);
@@ -78,10 +84,10 @@ fn lookups_have_the_same_bits_on_every_level_and_in_a_mean() {
 
 #[test]
 fn extrapolation_stays_within_bounds_and_black_channels_stay_black() {
-    let ((mut light, gradients), weights) = (light(4, 1.0), Weights::new(&lobe(), 4));
+    let ((mut light, gradients), weights) = (light(4, 1.0), Weights::new(&lobe()[..count(4)]));
     light.values[1] = [0.0; COUNT_MAX];
     with_pool(1, 4, |pool| {
-        let record = pool.push(&light, &gradients, 0.1).unwrap();
+        let record = pool.push(&Expansion::zernike(&light, &gradients), 0.1).unwrap();
         let at = |delta| pool.reflected(Level::detect(), &record, &weights, delta);
         let here = at(Vec2::ZERO);
         for delta in [Vec2::new(1e4, 0.0), Vec2::new(-1e4, 0.0), Vec2::new(0.0, f32::MAX)] {
@@ -97,12 +103,12 @@ fn extrapolation_stays_within_bounds_and_black_channels_stay_black() {
 fn any_record_and_any_weights_are_no_panic() {
     with_pool(2, 3, |pool| {
         let (light, gradients) = light(3, f32::NAN);
-        let record = pool.push(&light, &gradients, f32::INFINITY).unwrap();
-        let weights = Weights::new(&[f32::INFINITY; COUNT_MAX], 99);
-        for (offset, degree) in [(0, 3), (u32::MAX, 3), (1, u32::MAX), (0, 8)] {
-            let record = PooledRecord { offset, degree, ..record };
+        let record = pool.push(&Expansion::zernike(&light, &gradients), f32::INFINITY).unwrap();
+        let weights = Weights::new(&[f32::INFINITY; 1000]);
+        for (offset, groups) in [(0, [1, 1]), (u32::MAX, [1, 1]), (1, [u16::MAX; 2]), (0, [0, 5])] {
+            let record = PooledRecord { offset, groups, ..record };
             let _ = pool.reflected(Level::detect(), &record, &weights, Vec2::NAN);
         }
     });
-    assert!(CoefficientPool::new(usize::MAX, 8, &mut Arena::new(&mut [])).is_err());
+    assert!(CoefficientPool::new(usize::MAX, of(8), &mut Arena::new(&mut [])).is_err());
 }

@@ -5,11 +5,11 @@
 //! at the radius r = max(|x|, |y|) of the concentric map a part dx dy has π/4 dy dr/√(1 - r²).
 
 use super::{COUNT_MAX, ORDER_MAX, count, values};
-use crate::Level;
 use crate::cache::hemisphere::{Hemisphere, SIDE_MAX};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
-use core::f32::consts::FRAC_PI_4;
+use crate::{Level, Rgb};
+use core::f32::consts::{FRAC_PI_4, PI};
 use halflight_simd::kernels::outer::Outer;
 
 /// Parts along a side of a stratum.
@@ -66,6 +66,23 @@ impl<'m> ShTables<'m> {
         Ok(Self { n, order, integrals })
     }
 
+    /// Number of strata along a side.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// Order of the representation.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// Solid angle of each stratum.
+    pub(super) fn solid_angles(&self) -> impl Iterator<Item = f32> + use<'m> {
+        // Y_00 is constant.
+        let inverse = libm::sqrtf(4.0 * PI);
+        self.integrals.chunks_exact(count(self.order).div_ceil(16)).map(move |row| inverse * row[0][0])
+    }
+
     /// Integrals over each stratum, in registers of sixteen.
     pub fn integrals(&self) -> &'m [[f32; 16]] {
         self.integrals
@@ -77,6 +94,8 @@ impl<'m> ShTables<'m> {
 pub struct ShCoefficients {
     /// Order of the representation.
     pub order: usize,
+    /// Irradiance, W/m².
+    pub irradiance: Rgb,
     /// Coefficients of red, green and blue.
     pub values: [[f32; COUNT_MAX]; 3],
 }
@@ -95,6 +114,6 @@ impl ShCoefficients {
             let sums = sums.iter().flat_map(|group| group[channel]).take(count(tables.order));
             values.iter_mut().zip(sums).for_each(|(value, sum)| *value = sum);
         }
-        Some(Self { order: tables.order, values })
+        Some(Self { order: tables.order, irradiance: hemisphere.irradiance(), values })
     }
 }

@@ -11,16 +11,18 @@ use glam::Mat3;
 /// Entries of all matrices.
 const ENTRIES: usize = (ORDER_MAX + 1) * (2 * ORDER_MAX + 1) * (2 * ORDER_MAX + 3) / 3;
 
-/// Rotation of coefficients up to [`ORDER_MAX`].
+/// Rotation of coefficients up to some order.
 #[derive(Clone, Copy, Debug)]
 pub struct ShRotation {
+    order: usize,
     entries: [f32; ENTRIES],
 }
 
 impl ShRotation {
-    /// Rotation of functions by the matrix `by`: a function g becomes g(by⁻¹ w).
-    pub fn new(by: &Mat3) -> Self {
-        let mut rotation = Self { entries: [0.0; ENTRIES] };
+    /// Rotation of functions up to `order` by the matrix `by`: a function g becomes g(by⁻¹ w).
+    pub fn new(by: &Mat3, order: usize) -> Self {
+        let order = order.min(ORDER_MAX);
+        let mut rotation = Self { order, entries: [0.0; ENTRIES] };
         rotation.entries[0] = 1.0;
         // Order 1 is (y, z, x).
         const AXES: [usize; 3] = [1, 2, 0];
@@ -29,7 +31,7 @@ impl ShRotation {
                 rotation.set(1, m, n, by.col(column)[row]);
             }
         }
-        for l in 2..=ORDER_MAX as isize {
+        for l in 2..=order as isize {
             for m in -l..=l {
                 for n in -l..=l {
                     let entry = rotation.next(l, m, n);
@@ -40,10 +42,10 @@ impl ShRotation {
         rotation
     }
 
-    /// Turned coefficients.
+    /// Turned coefficients; zeros beyond the order.
     pub fn apply(&self, coefficients: &[f32; COUNT_MAX]) -> [f32; COUNT_MAX] {
         let mut turned = [0.0; COUNT_MAX];
-        for l in 0..=ORDER_MAX as isize {
+        for l in 0..=self.order as isize {
             for m in -l..=l {
                 let products = (-l..=l).map(|n| self.at(l, m, n) * coefficients[index(l as usize, n)]);
                 turned[index(l as usize, m)] = products.sum();
