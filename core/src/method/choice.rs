@@ -54,6 +54,9 @@ const RECORDS: f64 = 40.0;
 /// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
 const BIAS: f64 = 3e-4;
 
+/// Work of filling with records of lobes, relative to that without.
+const FILLING_OF_LOBES: f64 = 1.5;
+
 /// Least ratio of predicted errors for which records of lobes join an irradiance cache: they take more rays.
 const LEAST_GAIN_OF_LOBES: f64 = 1.1;
 
@@ -282,7 +285,8 @@ impl Trial {
     /// relMSE with a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
     /// `rare` is the noise of paths by rare light, as a factor on that of the trial.
     fn error_of_cache(&self, supply: usize, work: f64, rare: f64) -> f64 {
-        let filling = self.shards * self.resolution.filling(self.pixels, self.triangles);
+        let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
+        let filling = of_lobes * self.shards * self.resolution.filling(self.pixels, self.triangles);
         let wider = (filling / (FILLING * work)).max(1.0);
         let left = work - filling.min(FILLING * work);
         let record_rays = f64::from(self.resolution.strata * self.resolution.strata);
