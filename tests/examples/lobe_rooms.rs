@@ -63,7 +63,7 @@ fn main() {
             let all_rooms = ROOMS.map(|(room, _)| room);
             let all_floors = floors.each_ref().map(|(floor, _)| *floor);
             if names(&all_rooms) && names(&all_floors) {
-                compare(&wanted, (room, floor), &build(surface.clone()));
+                compare(&wanted, (room, floor), &build(*surface));
             }
         }
     }
