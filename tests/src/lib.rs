@@ -2,5 +2,6 @@
 pub mod agreement;
 pub mod memory;
 pub mod render;
+pub mod rooms;
 pub mod scenes;
 pub mod statistics;

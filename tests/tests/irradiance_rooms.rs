@@ -4,10 +4,10 @@
 use glam::Vec3;
 use halflight::render::Method;
 use halflight::save::Image;
-use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_tests::render::{blocks_of, number, render};
-use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, emitter, metal};
+use halflight_tests::rooms::{black, boxes_in_black, diffuse, lamp, needles, room, sheet, spot};
+use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, metal};
 use halflight_tests::statistics::agree_within;
 
 const SIZE: u32 = 64;
@@ -56,54 +56,21 @@ fn agrees(scene: &Scene, bias: f64, bias_of_mean: f64) {
     agree_within(&cache, &path, COMPARISONS, allowed).unwrap_or_else(|why| panic!("{why}"));
 }
 
-fn diffuse(reflectance: f32) -> Material {
-    Material::diffuse(Rgb::splat(reflectance))
-}
-
-/// A closed unit room seen from a corner.
-fn room(reflectance: f32) -> SceneBuffers {
-    let camera = Camera::look_at(Vec3::new(0.9, 0.8, 0.95), Vec3::new(0.3, 0.25, 0.0), Vec3::Y, 70.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let wall = buffers.material(diffuse(reflectance));
-    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
-    buffers
-}
-
-fn lamp(buffers: &mut SceneBuffers, center: Vec3, normal: Vec3, size: f32, radiance: f32) {
-    let lamp = buffers.material(emitter(0.0, radiance));
-    buffers.square(center, normal, size, lamp);
-}
-
-/// Light passes over a wall that is one sheet: records of both sides lie in the same place.
 #[test]
 fn a_sheet_between_light_and_dark_has_two_sides() {
-    let mut buffers = room(0.5);
-    let sheet = buffers.material(diffuse(0.5));
-    let corner = |x, y| Vec3::new(x, y, 0.5);
-    buffers.quad([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 0.7), corner(0.0, 0.7)], sheet);
-    lamp(&mut buffers, Vec3::new(0.5, 0.4, 0.02), Vec3::Z, 0.3, 10.0);
-    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
+    agrees(&sheet().scene(), BIAS, BIAS_OF_MEAN);
 }
 
 #[test]
 fn a_black_room_has_no_indirect_light_except_on_white_boxes() {
-    let mut buffers = room(0.0);
-    lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
-    let image = picture(&buffers.scene(), Method::IrradianceCache, 16);
+    let image = picture(&black().scene(), Method::IrradianceCache, 16);
     assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
-    // A reflecting box between black walls.
-    let white = buffers.material(diffuse(0.8));
-    buffers.cuboid(Vec3::new(0.2, 0.0, 0.2), Vec3::new(0.5, 0.3, 0.5), false, white);
-    buffers.cuboid(Vec3::new(0.6, 0.0, 0.1), Vec3::new(0.8, 0.5, 0.3), false, white);
-    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
+    agrees(&boxes_in_black().scene(), BIAS, BIAS_OF_MEAN);
 }
 
-/// The spot fills a hundredth of the hemisphere: few of a record's 256 gather rays hit it.
 #[test]
 fn a_small_bright_spot_lights_a_room() {
-    let mut buffers = room(0.5);
-    lamp(&mut buffers, Vec3::new(0.1, 0.6, 0.6), Vec3::NEG_X, 0.05, 1e3);
-    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
+    agrees(&spot().scene(), BIAS, BIAS_OF_MEAN);
 }
 
 /// Gather rays of the first records continue as paths, whose light of many bounces is noisy. Such records are
@@ -162,12 +129,7 @@ fn a_room_is_seen_in_brushed_metal() {
 
 #[test]
 fn thin_bars_cast_their_shadows() {
-    let mut buffers = room(0.5);
-    let needle = buffers.material(diffuse(0.1));
-    buffers.cuboid(Vec3::new(0.4, 0.0, 0.3), Vec3::new(0.403, 0.9, 0.303), false, needle);
-    buffers.cuboid(Vec3::new(0.2, 0.3, 0.2), Vec3::new(0.8, 0.302, 0.202), false, needle);
-    lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
-    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
+    agrees(&needles().scene(), BIAS, BIAS_OF_MEAN);
 }
 
 /// Gather rays along the wall pass below the board; strata detect geometry that overhangs the wall.
