@@ -35,8 +35,8 @@ impl CacheResolution {
         Self { strata: 16, error: 3e-5 },
     ];
 
-    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel, in a
-    /// scene of so many `triangles`.
+    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel, in
+    /// a scene of so many `triangles`.
     pub fn of_budget(rays: f64, (pixels, triangles): (f64, usize), shards: u32) -> Self {
         let affordable = |finer: &&Self| shards as f64 * finer.filling(pixels, triangles) <= FILLING * rays;
         Self::FINER.iter().find(affordable).copied().unwrap_or(Self::COARSEST)

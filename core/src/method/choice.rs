@@ -43,8 +43,8 @@ const FEWEST_SAMPLES: f64 = 4.0;
 const PILOT_RAYS: f64 = 5e5;
 const PILOT_SHARE: f64 = 0.08;
 
-/// Work of a ray of cached paths in a scene of few triangles, with its share of look-ups. Beside it stands that
-/// noise of light samples falls faster than with the inverse of their number.
+/// Work of a ray of cached paths in a scene of few triangles, with its share of look-ups. It is below one
+/// because noise of light samples falls faster than with the inverse of their number.
 const CACHED_RAY: f64 = 0.8;
 
 /// Gather rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in
@@ -282,8 +282,8 @@ impl Trial {
         self.reuse * self.noise[0] * self.work[0] / work
     }
 
-    /// relMSE with a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
-    /// `rare` is the noise of paths by rare light, as a factor on that of the trial.
+    /// relMSE with a cache after so much work for each pixel, by the light that records supply
+    /// ([`SUPPLIES`]). `rare` is the noise of paths by rare light, as a factor on that of the trial.
     fn error_of_cache(&self, supply: usize, work: f64, rare: f64) -> f64 {
         let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
         let filling = of_lobes * self.shards * self.resolution.filling(self.pixels, self.triangles);

@@ -32,8 +32,8 @@ pub mod view_placement;
 /// Rays per second and thread in a scene of few triangles. No clock is read.
 const RAYS_PER_SECOND: f64 = 6e6;
 
-/// Work in a scene of so many `triangles` relative to that in a scene of few: its hierarchy is deeper, and its
-/// surfaces have more detail. By seconds, measured on 24 scenes of 36 to 383,000 triangles.
+/// Work in a scene of so many `triangles` relative to that in a scene of few: its hierarchy is deeper, and
+/// its surfaces have more detail. By seconds, measured on 24 scenes of 36 to 383,000 triangles.
 pub fn work_of_detail(triangles: usize) -> f64 {
     1.0 + libm::log2(1.0 + triangles as f64 / 4096.0) / 3.0
 }
