@@ -35,14 +35,15 @@ impl CacheResolution {
         Self { strata: 16, error: 3e-5 },
     ];
 
-    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel, in
-    /// a scene of so many `triangles`.
+    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel.
+    /// `triangles` is the number of those of the scene.
     pub fn of_budget(rays: f64, (pixels, triangles): (f64, usize), shards: u32) -> Self {
         let affordable = |finer: &&Self| shards as f64 * finer.filling(pixels, triangles) <= FILLING * rays;
         Self::FINER.iter().find(affordable).copied().unwrap_or(Self::COARSEST)
     }
 
-    /// Work of filling for each of `pixels` pixels, in rays of paths, in a scene of so many `triangles`.
+    /// Work of filling for each of `pixels` pixels, in rays of paths, in a scene with this number of
+    /// `triangles`.
     pub fn filling(&self, pixels: f64, triangles: usize) -> f64 {
         let relative = |of: fn(&Self) -> f64| of(self) / of(&Self::COARSEST);
         let rays = relative(|resolution| f64::from(resolution.strata * resolution.strata));

@@ -191,9 +191,9 @@ fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
     is_lost && has_time && settings.shard == Shard::WHOLE
 }
 
-/// Settings that suit the time of the picture of a scene of so many `triangles`: paths without the structures
-/// that a pilot chooses where it suffices for a few samples of each pixel, and finer caches where it alone
-/// ends the picture.
+/// Settings that suit the time of the picture: paths without the structures that a pilot chooses where it
+/// suffices for a few samples of each pixel, and finer caches where it alone ends the picture of a scene with
+/// this number of `triangles`.
 fn within_time(settings: &Settings, goal: &Goal, triangles: usize, affords_pilots: bool) -> Settings {
     let mut own = settings.clone();
     if !affords_pilots {
