@@ -87,6 +87,7 @@ pub fn render(
         reserve: 0,
         widens: true,
         lobes,
+        picture: None,
     };
     let lights = VirtualLightSettings { light_paths: Some(1024), connections: None };
     let chains = MetropolisSettings::default();

@@ -1,19 +1,35 @@
-//! Resolution of an irradiance cache by the work of its picture: more gather rays for each record, and more
-//! records, where their gathering is a part of the work.
+//! Resolution of a cache: the gather rays of its records, and their density. Finer caches have less noise and
+//! take more time to fill.
+//!
+//! The first cache of a picture is filled at the coarsest resolution, and its rays are counted. Those of finer
+//! ones follow from them. A finer resolution is used where the picture is predicted to gain by it: the cache is
+//! then filled again.
 
 use super::work_of_detail;
 use crate::cache::irradiance::metric::HESSIAN_ERROR;
 
-/// Work of a gather ray, in rays of paths.
-const GATHER_RAY: f64 = 1.5;
+/// Time of a ray of filling in rays of paths of the same scene, and the part of it that does not grow with
+/// detail, of scenes with few triangles. Within a third on 22 of 24 scenes.
+const GATHER_RAY: f64 = 0.8;
+const GATHER_RAY_OF_FEW: f64 = 1.5;
 
-/// Gather rays for each pixel of a picture of one pixel at [`CacheResolution::COARSEST`]; they fall with this
-/// power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a factor of two.
-const GATHER_RAYS: f64 = 5700.0;
-const GATHER_POWER: f64 = 0.4;
+/// Rays of filling for each pixel of a picture of one pixel at [`CacheResolution::COARSEST`], in rays of paths;
+/// they fall with this power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a factor of
+/// two.
+const FILLING_RAYS: f64 = 8550.0;
+const FILLING_POWER: f64 = 0.4;
 
-/// Greatest fraction of the work for a finer cache.
-const FILLING: f64 = 0.4;
+/// Greatest fraction of the work for filling the coarsest cache, whose radii grow beyond it, and for a finer
+/// one: a cache that is cut has more error than a coarser one.
+const FILLING: f64 = 0.44;
+const FINER_FILLING: f64 = 0.4;
+
+/// Gather rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in
+/// records.
+const RECORDS: f64 = 20.0;
+
+/// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
+const BIAS: f64 = 1e-4;
 
 /// Gather rays of a record, and the density of records.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,29 +44,31 @@ impl CacheResolution {
     /// Resolution of short renders.
     pub const COARSEST: Self = Self { strata: 16, error: HESSIAN_ERROR };
 
-    /// Resolutions from the finest on.
-    const FINER: [Self; 3] = [
-        Self { strata: 32, error: 1e-5 },
-        Self { strata: 32, error: 3e-5 },
+    /// Resolutions that a cache may have, by the rays of filling.
+    pub const ALL: [Self; 5] = [
+        Self::COARSEST,
         Self { strata: 16, error: 3e-5 },
+        Self { strata: 32, error: HESSIAN_ERROR },
+        Self { strata: 32, error: 3e-5 },
+        Self::FINEST,
     ];
 
-    /// Resolution of a picture of `pixels` pixels in `shards` parts, with time for `rays` for each pixel.
-    /// `triangles` is the number of those of the scene.
-    pub fn of_budget(rays: f64, (pixels, triangles): (f64, usize), shards: u32) -> Self {
-        let affordable = |finer: &&Self| shards as f64 * finer.filling(pixels, triangles) <= FILLING * rays;
-        Self::FINER.iter().find(affordable).copied().unwrap_or(Self::COARSEST)
-    }
+    /// Resolution of long renders.
+    pub const FINEST: Self = Self { strata: 32, error: 1e-5 };
 
-    /// Work of filling for each of `pixels` pixels, in rays of paths, in a scene with this number of
-    /// `triangles`.
-    pub fn filling(&self, pixels: f64, triangles: usize) -> f64 {
+    /// Rays of filling relative to [`CacheResolution::COARSEST`].
+    pub fn filling(&self) -> f64 {
         let relative = |of: fn(&Self) -> f64| of(self) / of(&Self::COARSEST);
         let rays = relative(|resolution| f64::from(resolution.strata * resolution.strata));
         // Errors grow with the fourth power of radii.
-        let records = 1.0 / libm::sqrt(relative(|resolution| resolution.error.into()));
-        let coarsest = GATHER_RAY * GATHER_RAYS * libm::pow(pixels, -GATHER_POWER);
-        coarsest * rays * records * work_of_detail(triangles)
+        rays / libm::sqrt(relative(|resolution| resolution.error.into()))
+    }
+
+    /// Predicted work of filling both caches of a picture of `pixels` pixels at this resolution, in rays of
+    /// paths, in a scene with this number of `triangles`.
+    pub fn predicted_filling(&self, pixels: f64, triangles: usize) -> f64 {
+        let coarsest = FILLING_RAYS * libm::pow(pixels, 1.0 - FILLING_POWER);
+        coarsest * self.filling() * work_of_detail(triangles)
     }
 }
 
@@ -60,24 +78,113 @@ impl Default for CacheResolution {
     }
 }
 
+/// Work and noise of a picture with a cache.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CachedPicture {
+    /// Rays of paths for which there is time; may be infinite.
+    pub rays: f64,
+    /// relMSE × rays of light that no record supplies.
+    pub samples: f64,
+    /// Variance of the light of one gather ray, relative to the light of the picture.
+    pub gathered: f64,
+    /// relMSE at which the picture ends, if any.
+    pub error: Option<f64>,
+}
+
+impl CachedPicture {
+    /// Picture of so many `rays` of which only the time is known. Its cache is the finest for which there is
+    /// time.
+    pub fn of_time(rays: f64) -> Self {
+        Self { rays, samples: 0.0, gathered: 1.0, error: None }
+    }
+
+    /// relMSE by records of `resolution`, however many samples there are.
+    fn floor(&self, resolution: &CacheResolution) -> f64 {
+        let record_rays = f64::from(resolution.strata * resolution.strata);
+        let bias = BIAS * f64::from(resolution.error / CacheResolution::COARSEST.error);
+        self.gathered / (record_rays * RECORDS) + bias
+    }
+
+    /// Predicted relMSE after all rays, of which `filling` fill the cache at `resolution`.
+    pub fn error_after(&self, resolution: &CacheResolution, filling: f64) -> f64 {
+        let most = FILLING * self.rays;
+        let wider = (filling / most).max(1.0);
+        self.samples / (self.rays - filling.min(most)) + wider * self.floor(resolution)
+    }
+
+    /// Rays until the picture has this `error`, or infinity.
+    fn rays_until(&self, error: f64, resolution: &CacheResolution, filling: f64) -> f64 {
+        match error - self.floor(resolution) {
+            left if left > 0.0 => filling + self.samples / left,
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The resolution with the least work until the picture ends by its error, or else with the least error
+    /// after its time. `filling` is the work of filling both caches at [`CacheResolution::COARSEST`], in rays
+    /// of paths.
+    pub fn resolution(&self, filling: f64) -> CacheResolution {
+        let is_affordable = |resolution: &CacheResolution| {
+            *resolution == CacheResolution::COARSEST
+                || filling * resolution.filling() <= FINER_FILLING * self.rays
+        };
+        let least = |of: &dyn Fn(&CacheResolution) -> f64| {
+            let affordable = CacheResolution::ALL.iter().filter(|resolution| is_affordable(resolution));
+            affordable.min_by(|a, b| of(a).total_cmp(&of(b))).copied().unwrap_or_default()
+        };
+        let filling = |resolution: &CacheResolution| filling * resolution.filling();
+        let by_time = || least(&|resolution| self.error_after(resolution, filling(resolution)));
+        let Some(error) = self.error else { return by_time() };
+        let rays = |resolution: &CacheResolution| self.rays_until(error, resolution, filling(resolution));
+        let by_error = least(&rays);
+        if rays(&by_error) < self.rays { by_error } else { by_time() }
+    }
+
+    /// Work of counted `rays` of filling, in rays of paths, in a scene with this number of `triangles`.
+    pub fn filling_of(rays: u64, triangles: usize) -> f64 {
+        (GATHER_RAY + GATHER_RAY_OF_FEW / work_of_detail(triangles)) * rays as f64
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const FILLING: f64 = 2e6;
+
     #[test]
     fn longer_renders_have_finer_caches_within_a_part_of_the_work() {
-        let pixels = 16384.0;
-        let of = |rays, shards| CacheResolution::of_budget(rays, (pixels, 36), shards);
-        let mut last = CacheResolution::COARSEST.filling(pixels, 36);
-        for rays in [10.0, 100.0, 1e3, 3e3, 1e4, 1e5] {
-            let chosen = of(rays, 1);
-            let filling = chosen.filling(pixels, 36);
-            assert!(filling >= last && (chosen == CacheResolution::COARSEST || filling <= FILLING * rays));
+        let mut last = 0.0;
+        for rays in [1e5, 1e6, 1e7, 3e7, 1e8, 1e9] {
+            let chosen = CachedPicture::of_time(rays).resolution(FILLING);
+            let filling = FILLING * chosen.filling();
+            assert!(filling >= last && (chosen == CacheResolution::COARSEST || filling <= 0.4 * rays));
             last = filling;
         }
-        assert_eq!(of(1e5, 1), CacheResolution::FINER[0]);
-        assert_eq!(of(1e3, 8), CacheResolution::COARSEST);
-        let detailed = CacheResolution::of_budget(1e4, (pixels, 1 << 20), 1);
-        assert!(of(1e4, 1).strata > detailed.strata, "more detail takes more records");
+        let of = |rays, filling| CachedPicture::of_time(rays).resolution(filling);
+        assert_eq!(of(1e9, FILLING), CacheResolution::FINEST);
+        assert_eq!(of(1e9, 400.0 * FILLING), CacheResolution::COARSEST);
+    }
+
+    #[test]
+    fn light_of_much_variance_has_more_rays_and_noise_of_samples_leaves_them_out() {
+        let of = |gathered, samples| {
+            CachedPicture { rays: 8e7, samples, gathered, error: None }.resolution(FILLING)
+        };
+        assert_eq!(of(50.0, 1e4).strata, 32);
+        assert_eq!(of(0.1, 1e6), CacheResolution::COARSEST);
+        assert!(of(0.1, 1e3).error < CacheResolution::COARSEST.error);
+    }
+
+    #[test]
+    fn a_requested_error_has_the_cache_that_reaches_it_soonest() {
+        let of = |error| {
+            let picture =
+                CachedPicture { rays: f64::INFINITY, samples: 1e3, gathered: 5.0, error: Some(error) };
+            picture.resolution(FILLING)
+        };
+        assert_eq!(of(1e-2), CacheResolution::COARSEST);
+        assert_eq!(of(2e-4).strata, 32);
+        assert_eq!(of(1e-9), CacheResolution::FINEST);
     }
 }

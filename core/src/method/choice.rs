@@ -7,7 +7,7 @@
 //! the estimators of direct light. Work is counted in rays and not in seconds: the choice follows from scene,
 //! settings, seed, memory and, where time is limited, the number of threads.
 
-use super::cache_resolution::CacheResolution;
+use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::caustics::{self, CausticPathTracing};
 use super::counts::{self, LightPaths};
 use super::executor::{Executor, Passed};
@@ -47,21 +47,11 @@ const PILOT_SHARE: f64 = 0.08;
 /// because noise of light samples falls faster than with the inverse of their number.
 const CACHED_RAY: f64 = 0.8;
 
-/// Gather rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in
-/// records.
-const RECORDS: f64 = 40.0;
-
-/// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
-const BIAS: f64 = 3e-4;
-
 /// Work of filling with records of lobes, relative to that without.
 const FILLING_OF_LOBES: f64 = 1.5;
 
 /// Least ratio of predicted errors for which records of lobes join an irradiance cache: they take more rays.
 const LEAST_GAIN_OF_LOBES: f64 = 1.1;
-
-/// Greatest fraction of the work for filling; radii grow if filling needs more.
-const FILLING: f64 = 0.44;
 
 /// Factor on the predicted error of light paths: their rays take more time.
 const LIGHT_PATHS_FACTOR: f64 = 2.0;
@@ -102,14 +92,14 @@ impl Goal {
 }
 
 /// Method with the least predicted error or work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Best {
     /// Path tracing with all of its means.
     Paths,
-    /// An irradiance cache.
-    Cache,
-    /// An irradiance cache with records of lobes.
-    RadianceCache,
+    /// An irradiance cache, by which the picture is predicted to have this work and noise.
+    Cache(CachedPicture),
+    /// An irradiance cache with records of lobes, as above.
+    RadianceCache(CachedPicture),
     /// Light paths with the counts of a pilot.
     LightPaths,
 }
@@ -131,8 +121,8 @@ struct TileTrial {
 /// Caches that a trial predicts.
 #[derive(Clone, Copy, Debug)]
 pub struct TrialCaches {
-    /// Gather rays and density of the records.
-    pub resolution: CacheResolution,
+    /// Gather rays and density of the records, if they are fixed.
+    pub resolution: Option<CacheResolution>,
     /// Parts in which the picture is rendered, each with caches of its own.
     pub shards: u32,
     /// Lobes that records may serve.
@@ -180,20 +170,20 @@ pub struct Trial {
     pub pixels: f64,
     /// Triangles of the scene.
     pub triangles: usize,
-    /// Gather rays and density of the records.
-    pub resolution: CacheResolution,
+    /// Gather rays and density of the records, if they are fixed.
+    pub resolution: Option<CacheResolution>,
     /// Parts in which the picture is rendered, each with caches of its own.
     pub shards: f64,
     /// Whether caustic photons belong to the picture.
     pub has_photons: bool,
 }
 
-/// Predicted relMSE of each method; infinite for one that is no choice.
+/// Predicted relMSE of methods without a cache; infinite for one that is no choice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Predictions {
     paths: f64,
-    cache: f64,
-    radiance_cache: f64,
+    /// Noise of paths by rare light, as a factor on that of the trial.
+    rare: f64,
     light_paths: f64,
 }
 
@@ -282,37 +272,39 @@ impl Trial {
         self.reuse * self.noise[0] * self.work[0] / work
     }
 
-    /// relMSE with a cache after so much work for each pixel, by the light that records supply
-    /// ([`SUPPLIES`]). `rare` is the noise of paths by rare light, as a factor on that of the trial.
-    fn error_of_cache(&self, supply: usize, work: f64, rare: f64) -> f64 {
-        let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
-        let filling = of_lobes * self.shards * self.resolution.filling(self.pixels, self.triangles);
-        let wider = (filling / (FILLING * work)).max(1.0);
-        let left = work - filling.min(FILLING * work);
-        let record_rays = f64::from(self.resolution.strata * self.resolution.strata);
-        let gathered = (self.noise[0] - self.noise[supply]).max(0.0) / (record_rays * RECORDS);
-        let bias = BIAS * f64::from(self.resolution.error / CacheResolution::COARSEST.error);
+    /// Picture with a cache after so much work for each pixel, by the light that records supply
+    /// ([`SUPPLIES`]), and its relMSE. `rare` is the noise of paths by rare light, as a factor on that of the
+    /// trial.
+    fn cached(&self, supply: usize, (work, error): (f64, Option<f64>), rare: f64) -> (CachedPicture, f64) {
         let cached_ray = CACHED_RAY * work_of_detail(self.triangles);
-        rare * self.noise[supply] * cached_ray * self.work[supply] / left + wider * (rare * gathered + bias)
+        let product = rare * self.noise[supply] * cached_ray * self.work[supply];
+        let pixels = self.pixels / self.shards;
+        let picture = CachedPicture {
+            rays: work * pixels,
+            samples: product * pixels,
+            gathered: rare * (self.noise[0] - self.noise[supply]).max(0.0),
+            error,
+        };
+        let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
+        let filling = |resolution: CacheResolution| {
+            of_lobes * resolution.predicted_filling(self.pixels, self.triangles)
+        };
+        let chosen = || picture.resolution(filling(CacheResolution::COARSEST));
+        let resolution = self.resolution.unwrap_or_else(chosen);
+        (picture, picture.error_after(&resolution, filling(resolution)))
     }
 
     /// Errors after so much work for each pixel.
-    fn predict(&self, work: f64, may_have_cache: bool, light_paths: Option<LightPaths>) -> Predictions {
+    fn predict(&self, work: f64, light_paths: Option<LightPaths>) -> Predictions {
         let of_trial = self.error_of_paths(work);
         // The pilot of light paths finds light that the few paths of the trial miss.
         let of_pilot =
             light_paths.and_then(|pilot| pilot.of_paths).map(|product| self.reuse * product / work);
         let factor = if self.has_photons { PHOTONS_FACTOR } else { 1.0 };
         let paths = (factor * of_trial).max(of_pilot.unwrap_or(0.0).min(ALL_IS_MISSING));
-        let rare = paths / of_trial;
-        let cache = |supply, is_choice| match is_choice {
-            true => self.error_of_cache(supply, work, rare),
-            false => f64::INFINITY,
-        };
         Predictions {
             paths,
-            cache: cache(IRRADIANCE, may_have_cache),
-            radiance_cache: cache(RADIANCE, may_have_cache && self.has_lobes),
+            rare: paths / of_trial,
             light_paths: light_paths.map_or(f64::INFINITY, |pilot| LIGHT_PATHS_FACTOR * pilot.product / work),
         }
     }
@@ -333,18 +325,25 @@ impl Trial {
         if self.noise[0] <= 0.0 {
             return (Best::Paths, Finding::new("method", Used, "paths show no noise"));
         }
-        let Predictions { paths, cache, radiance_cache, light_paths } =
-            self.predict(self.budget(goal), may_have_cache, light_paths);
+        let work = self.budget(goal);
+        let Predictions { paths, rare, light_paths } = self.predict(work, light_paths);
+        let [(first, cache), (second, radiance_cache)] =
+            [(IRRADIANCE, may_have_cache), (RADIANCE, may_have_cache && self.has_lobes)].map(
+                |(supply, is_choice)| {
+                    let (picture, error) = self.cached(supply, (work, goal.error), rare);
+                    (picture, if is_choice { error } else { f64::INFINITY })
+                },
+            );
         let cached = cache.min(radiance_cache);
         let (best, reason) = match () {
             () if paths <= LEAST_GAIN * cached.min(light_paths) => {
                 (Best::Paths, "path tracing has the least error")
             }
             () if cached <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
-                (Best::Cache, "an irradiance cache has less error than path tracing")
+                (Best::Cache(first), "an irradiance cache has less error than path tracing")
             }
             () if cached <= light_paths => {
-                (Best::RadianceCache, "records of rough reflections have less error than paths")
+                (Best::RadianceCache(second), "records of rough reflections have less error than paths")
             }
             () => (Best::LightPaths, "light paths have less error than paths alone"),
         };

@@ -5,16 +5,20 @@
 //! difference of the halves of the film shows the errors of records too. First both caches are filled, then
 //! they are frozen. Paths go on where no record is valid.
 
+mod settings;
+
+pub use settings::CacheSettings;
+
+use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::executor::{Executor, Passed};
-use super::record_placement::{CacheBuilder, LobeGathering, RecordPlacement, step_footprint, step_points};
+use super::record_placement::{CacheBuilder, LobeGathering, RecordPlacement, step_points};
 use super::view_placement::{ViewPlacement, Views};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
-use crate::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
-use crate::cache::radiance::{LobeSettings, PooledRecord, Representation, ServedLobes};
+use crate::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
+use crate::cache::radiance::{PooledRecord, ServedLobes};
 use crate::cache::view::ViewRecords;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
-use crate::scene::Scene;
 use crate::transport::cached::gather::GatherPoint;
 use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 
@@ -34,62 +38,19 @@ const TIME: f32 = 0.25;
 /// The same for the view-bound records of both halves, of the time that is left then.
 const VIEW_TIME: f32 = 0.15;
 
-/// Strata along a side behind rough surfaces are half as many, in multiples of this.
-const BLOCK: usize = 8;
-
-/// Settings of both caches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CacheSettings {
-    /// The rule of the validity radii.
-    pub metric: Metric,
-    /// Error allowed, in the unit of the metric.
-    pub error: f32,
-    /// Strata along a side of the hemisphere of a record.
-    pub strata: usize,
-    /// Records that each cache has memory for at least, whatever is available.
-    pub fewest: usize,
-    /// Bytes that are to stay available.
-    pub reserve: usize,
-    /// True if records become wider where there was no time to fill the caches.
-    pub widens: bool,
-    /// Lobes that records serve; `None` for irradiance alone.
-    pub lobes: Option<LobeSettings>,
-}
-
-impl CacheSettings {
-    /// Strata along a side behind rough surfaces, of which a pixel sees the mean.
-    fn coarse(&self) -> usize {
-        self.strata.div_ceil(2 * BLOCK) * BLOCK
-    }
-
-    /// Strata along a side for records with coefficients.
-    fn lobe_strata(&self) -> usize {
-        self.lobes.map_or(0, |lobes| lobes.strata().max(self.strata))
-    }
-
-    /// Representation of the coefficients at most, if records have any.
-    pub fn representation(&self) -> Option<Representation> {
-        self.lobes.map(|lobes| lobes.representation())
-    }
-
-    /// Bytes of the tables of lobes in `scene`, and of their strata.
-    pub fn lobe_footprint(&self, scene: &Scene) -> Footprint {
-        match self.lobes {
-            Some(lobes) => ServedLobes::footprint(scene, lobes.basis)
-                .and(LobeGathering::footprint(self.lobe_strata(), lobes.representation())),
-            None => Footprint::default(),
-        }
-    }
-
-    /// Bytes of the tables of strata, and of the points of placement.
-    pub fn gathering_footprint(&self) -> Footprint {
-        let tables = CellFlux::footprint(self.coarse()).and(CellFlux::footprint(self.strata));
-        tables.and(step_footprint())
-    }
-}
-
 /// Structures that [`IrradianceCaching::fill`] fills: two caches, and view-bound records beside each.
 pub const FILLED: usize = 4;
+
+/// Choice of a finer resolution after the first cache is filled.
+struct Finer<'a> {
+    picture: CachedPicture,
+    /// Triangles of the scene.
+    triangles: usize,
+    /// Tables of [`CacheResolution::FINEST`].
+    flux: [CellFlux<'a>; 2],
+    /// Rays of the first cache.
+    rays: u64,
+}
 
 /// Irradiance caching of one picture.
 pub struct IrradianceCaching<'a, F> {
@@ -97,6 +58,9 @@ pub struct IrradianceCaching<'a, F> {
     metric: metric::Settings,
     /// Tables of the strata of records, and of those behind rough surfaces.
     flux: [CellFlux<'a>; 2],
+    finer: Option<Finer<'a>>,
+    /// Resolution of the records.
+    resolution: CacheResolution,
     size: [u32; 2],
     builders: [CacheBuilder<'a>; 2],
     step: &'a mut [GatherPoint],
@@ -111,7 +75,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
     /// Working memory of a worker, for paths and for gather rays, both with photons of caustics.
     pub fn scratch(settings: &CacheSettings) -> Footprint {
         let gathering = PathIntegrator::<F>::gather_scratch_with::<((), CausticMerging)>(
-            settings.strata.max(settings.lobe_strata()),
+            settings.most_strata().max(settings.lobe_strata()),
         );
         let gathering = match settings.lobes {
             Some(_) if F::GLOSSY => gathering.or(PathIntegrator::<F>::view_scratch::<((), CausticMerging)>()),
@@ -130,8 +94,21 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         memory: &mut impl MemorySource<'a>,
     ) -> Result<Self, OutOfMemory> {
         let mut arena = memory.take("gathering", settings.gathering_footprint())?;
-        let coarse = CellFlux::build(settings.coarse(), &mut arena)?;
-        let flux = [CellFlux::build(settings.strata, &mut arena)?, coarse];
+        let mut tables = |strata| {
+            let [seen, behind_rough] = CacheSettings::strata_of(strata);
+            Ok::<_, OutOfMemory>([
+                CellFlux::build(seen, &mut arena)?,
+                CellFlux::build(behind_rough, &mut arena)?,
+            ])
+        };
+        let flux = tables(settings.strata)?;
+        let finer = match settings.picture {
+            Some(picture) => {
+                let triangles = context.scene.mesh.triangles.len();
+                Some(Finer { picture, triangles, flux: tables(settings.most_strata())?, rays: 0 })
+            }
+            None => None,
+        };
         let step = step_points(&mut arena)?;
         let lobes = match &settings.lobes {
             Some(lobes) if F::GLOSSY => {
@@ -170,6 +147,8 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             integrator: context.integrator(),
             metric: metric::Settings { error: settings.error, ..usual },
             flux,
+            finer,
+            resolution: CacheResolution { strata: settings.strata as u32, error: settings.error },
             size: [context.settings.width, context.settings.height],
             builders,
             step,
@@ -183,8 +162,14 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         if context.settings.max_depth <= 2 {
             method.finish();
             method.views = None;
+            method.finer = None;
         }
         Ok(method)
+    }
+
+    /// Gather rays and density of the records.
+    pub fn resolution(&self) -> CacheResolution {
+        self.resolution
     }
 
     /// Begins with the records of other caches of the scene, for which light was gathered at `gathered`
@@ -294,15 +279,37 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             executor.within(fraction, |executor| placement.fill(builder, executor))
         })?;
         state.counters += counters;
-        if is_complete || executor.is_over() {
-            return Ok(is_complete);
+        if let Some(finer) = &mut self.finer {
+            finer.rays += counters.all_rays();
         }
-        if self.widens {
-            state.counters += placement.widen(builder, *executor)?.counters;
+        let is_over = executor.is_over();
+        if !is_complete && !is_over {
+            if self.widens {
+                state.counters += placement.widen(builder, *executor)?.counters;
+            }
+            builder.finish();
+            self.is_cut = true;
         }
-        builder.finish();
-        self.is_cut = true;
-        Ok(true)
+        if is_complete && number == 0 && self.refines() {
+            return self.fill(0, photons, round);
+        }
+        Ok(is_complete || !is_over)
+    }
+
+    /// Empties the first cache if the picture gains by finer ones, and returns whether it does.
+    fn refines(&mut self) -> bool {
+        let Some(Finer { picture, triangles, flux, rays }) = self.finer.take() else { return false };
+        let resolution = picture.resolution(CachedPicture::filling_of(2 * rays, triangles));
+        if resolution == self.resolution {
+            return false;
+        }
+        if resolution.strata != self.resolution.strata {
+            self.flux = flux;
+        }
+        self.metric.error = resolution.error;
+        self.resolution = resolution;
+        self.builders.iter_mut().for_each(CacheBuilder::clear);
+        true
     }
 
     /// Fills the view-bound records of half `number`, after both caches.

@@ -18,6 +18,7 @@ use core::time::Duration;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::findings::{Findings, Value};
 use halflight_core::method::{RenderState, Shard};
+use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
 
@@ -29,6 +30,14 @@ const FULL_STEP: u32 = 8;
 
 /// Seconds per pixel and thread reserved for an error estimate before one has been timed.
 const ESTIMATING: f64 = 1e-7;
+
+/// Seconds per pixel reserved for the picture and its file.
+const WRITING: f64 = 2e-7;
+
+/// Seconds reserved for the end of a picture of so many pixels.
+pub(super) fn ending_seconds(pixels: usize) -> f64 {
+    WRITING * pixels as f64
+}
 
 /// A picture to be rendered.
 pub(super) struct Picture<'a> {
@@ -72,6 +81,8 @@ struct Progressive<'a> {
     /// Seconds of the last estimate, and of all estimates.
     estimating: f64,
     estimated: f64,
+    /// Seconds reserved for the end of the picture.
+    ending: f64,
     /// The film file, and the time of its last write.
     kept: RewrittenFile<'a>,
     saved: Instant,
@@ -112,6 +123,7 @@ impl<'a> Progressive<'a> {
             report: None,
             estimating,
             estimated: 0.0,
+            ending: ending_seconds(pixels as usize),
             kept: RewrittenFile::in_file(file),
             saved: Instant::now(),
             began: Instant::now(),
@@ -121,7 +133,7 @@ impl<'a> Progressive<'a> {
 
     /// The next round; `None` if a stop rule holds.
     fn plan(&self) -> Option<Plan> {
-        self.rounds.next(self.picture.clock.seconds(), self.estimating)
+        self.rounds.next(self.picture.clock.seconds(), self.estimating + self.ending)
     }
 
     /// Adds samples, estimates the error if due, writes the film file and reports progress.
@@ -134,7 +146,10 @@ impl<'a> Progressive<'a> {
         };
         let Picture { setup, state, clock, .. } = &mut self.picture;
         let (seconds, spp) = (clock.seconds(), self.rounds.spp());
-        let reference = self.reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&state.film))));
+        let reference = self
+            .reference
+            .as_ref()
+            .map(|r| clock.pause(|| r.compare(&setup.workers.install(|| image(&state.film)))));
         self.history.push(Round { seconds, spp, rays: state.counters.all_rays(), error, reference });
         let is_due = |every: f64| self.saved.elapsed().as_secs_f64() >= every;
         let checkpoint = setup.settings.checkpoint.as_ref();
@@ -308,7 +323,10 @@ impl<'a> Progressive<'a> {
             last.error = error;
         }
         let film = &state.film;
-        let (image, filled_pixels) = without_gaps(state, sketch, workers);
+        let values = |pixel: Pixel| (pixel.count(), (pixel.mean().to_array(), pixel.variance().to_array()));
+        let (samples, (mean, variance)): (Vec<u32>, (Vec<_>, Vec<_>)) =
+            workers.install(|| by_rows(film, values).unzip());
+        let (image, filled_pixels) = without_gaps(of_size(film, mean), &samples, (state, sketch, workers));
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
         // A report that does not fit into memory is omitted: the picture is complete.
@@ -323,8 +341,8 @@ impl<'a> Progressive<'a> {
             spp: self.rounds.spp(),
             rounds: self.rounds.count(),
             history: self.history,
-            variance: map(film, |pixel| pixel.variance().to_array()),
-            samples: by_rows(film).map(|pixel| pixel.count()).collect(),
+            variance: of_size(film, variance),
+            samples,
             threads: workers.count(),
             seconds: Seconds { build: 0.0, render, estimate: self.estimated },
             counters: state.counters,
@@ -359,14 +377,18 @@ fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
 }
 
-/// Picture of `state` with filled gaps, and the number of pixels in tiles without samples.
-fn without_gaps(state: &RenderState, sketch: &Sketch, workers: &Workers) -> (Image, u64) {
-    let mut image = image(&state.film);
+/// `image` of a film with these `samples` of each pixel, with filled gaps, and the number of pixels in tiles
+/// without samples.
+fn without_gaps(
+    mut image: Image,
+    samples: &[u32],
+    (state, sketch, workers): (&RenderState, &Sketch, &Workers),
+) -> (Image, u64) {
     // Other shards fill the gaps of a shard.
     if state.shard != Shard::WHOLE || !state.samples.contains(&0) {
         return (image, 0);
     }
-    let mut known: Vec<bool> = by_rows(&state.film).map(|pixel| pixel.count() > 0).collect();
+    let mut known: Vec<bool> = samples.iter().map(|&count| count > 0).collect();
     let gaps = known.iter().filter(|known| !**known).count() as u64;
     if known.iter().all(|known| !known) {
         for ([x, y], light) in sketch(workers) {
@@ -379,13 +401,19 @@ fn without_gaps(state: &RenderState, sketch: &Sketch, workers: &Workers) -> (Ima
 }
 
 pub(super) fn image(film: &Film) -> Image {
-    map(film, |pixel| pixel.mean().to_array())
+    of_size(film, by_rows(film, |pixel| pixel.mean().to_array()).collect())
 }
 
-fn map(film: &Film, value: impl Fn(Pixel) -> [f32; 3]) -> Image {
-    Image { width: film.width(), height: film.height(), pixels: by_rows(film).map(value).collect() }
+fn of_size(film: &Film, pixels: Vec<[f32; 3]>) -> Image {
+    Image { width: film.width(), height: film.height(), pixels }
 }
 
-fn by_rows(film: &Film) -> impl Iterator<Item = Pixel> {
-    (0..film.height()).flat_map(move |y| (0..film.width()).map(move |x| film.pixel(x, y)))
+/// `value` of all pixels, row by row.
+fn by_rows<'f, T: Send + 'f>(
+    film: &'f Film,
+    value: impl Fn(Pixel) -> T + Sync + Send + 'f,
+) -> impl IndexedParallelIterator<Item = T> + 'f {
+    let width = film.width() as usize;
+    let pixels = (0..width * film.height() as usize).into_par_iter();
+    pixels.map(move |i| value(film.pixel((i % width) as u32, (i / width) as u32)))
 }

@@ -6,7 +6,7 @@ use super::film_file::{Identity, Reader};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{self, Attempt, Method, Plan, RenderSetup};
-use super::picture::Picture;
+use super::picture::{self, Picture};
 use super::threads::Workers;
 use super::{
     Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file,
@@ -23,8 +23,6 @@ use halflight_core::findings::Decision::LeftOut;
 use halflight_core::findings::{Finding, Findings};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
-use halflight_core::method::cache_resolution::CacheResolution;
-use halflight_core::method::choice::Goal;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, UNLIMITED};
@@ -107,12 +105,13 @@ impl WithFeatures for Render<'_> {
         let build = build_start.elapsed().as_secs_f64();
 
         let mut clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
-        let left = settings.stop.seconds.map(|limit| limit - clock.seconds());
+        let left =
+            settings.stop.seconds.map(|limit| limit - clock.seconds() - picture::ending_seconds(pixels));
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
         let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let affords_pilots = method != Method::Path || plain.goal().affords_pilots(pixels);
-        let within_time = within_time(settings, &plain.goal(), scene.mesh.triangles.len(), affords_pilots);
-        let settings = &within_time;
+        let hurried = (!affords_pilots).then(|| without_pilots(settings));
+        let settings = hurried.as_ref().unwrap_or(settings);
         let plain = RenderSetup { settings, ..plain };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
         let setup = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
@@ -191,25 +190,12 @@ fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
     is_lost && has_time && settings.shard == Shard::WHOLE
 }
 
-/// Settings that suit the time of the picture: paths without the structures that a pilot chooses where it
-/// suffices for a few samples of each pixel, and finer caches where it alone ends the picture of a scene with
-/// this number of `triangles`.
-fn within_time(settings: &Settings, goal: &Goal, triangles: usize, affords_pilots: bool) -> Settings {
-    let mut own = settings.clone();
-    if !affords_pilots {
-        own.caustics = false;
-        own.reuse = own.reuse.or(Some(false));
-        own.environment_visibility = own.environment_visibility.or(Some(false));
-    }
-    let has_file = settings.load_cache.is_some() || settings.save_cache.is_some();
-    if let Goal { rays: Some(rays), samples: None, error: None } = *goal
-        && !has_file
-    {
-        let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let resolution = CacheResolution::of_budget(rays / pixels, (pixels, triangles), settings.shard.count);
-        own.cache = own.cache.with(resolution);
-    }
-    own
+/// Settings of a picture whose time suffices for a few samples of each pixel: paths without the structures
+/// that a pilot chooses.
+fn without_pilots(settings: &Settings) -> Settings {
+    let reuse = settings.reuse.or(Some(false));
+    let environment_visibility = settings.environment_visibility.or(Some(false));
+    Settings { caustics: false, reuse, environment_visibility, ..settings.clone() }
 }
 
 /// Path settings common to all methods.

@@ -101,6 +101,13 @@ impl<'m> CacheBuilder<'m> {
         self.gathered = gathered;
     }
 
+    /// Begins again without records.
+    pub fn clear(&mut self) {
+        self.cache.retain(|_| false);
+        (self.via, self.next, self.sweeps, self.before) = (Some(Via::Specular), 0, 0, 0);
+        (self.gathered, self.restored) = (0, 0);
+    }
+
     /// Begins again with the records that there are, their radii times `factor`, at most 1.
     pub fn tighten(&mut self, factor: f32) {
         self.cache.scale_radii(factor);

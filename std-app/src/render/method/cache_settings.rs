@@ -24,6 +24,11 @@ impl CacheSettings {
         self.strata.unwrap_or(Self::STRATA)
     }
 
+    /// Whether the rays and the density of records may be chosen for the picture.
+    pub(in crate::render) fn is_open(&self) -> bool {
+        self.metric == Metric::Halflight && self.error.is_none() && self.strata.is_none()
+    }
+
     /// Gather rays and density of the records. Coarser ones, and those of other metrics, are taken for as
     /// dense as the default.
     pub(in crate::render) fn resolution(&self) -> CacheResolution {
@@ -32,14 +37,6 @@ impl CacheSettings {
             _ => CacheResolution::COARSEST.error,
         };
         CacheResolution { strata: self.strata(), error }
-    }
-
-    /// These settings with `resolution`, unless a part of it is requested.
-    pub(in crate::render) fn with(self, resolution: CacheResolution) -> Self {
-        if self.metric != Metric::Halflight || self.error.is_some() || self.strata.is_some() {
-            return self;
-        }
-        Self { error: Some(resolution.error), strata: Some(resolution.strata), ..self }
     }
 
     /// Allowed error, by request or default.

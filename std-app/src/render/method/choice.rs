@@ -31,7 +31,8 @@ pub(super) fn choose<'a, F: Features>(
     if !goal.affords_trial(context.pixels()) {
         return Ok(None);
     }
-    let (resolution, shards) = (settings.cache.resolution(), settings.shard.count);
+    let resolution = (!setup.has_open_cache()).then(|| settings.cache.resolution());
+    let shards = settings.shard.count;
     let caches = TrialCaches { resolution, shards, lobes: settings.lobes };
     let Some(trial) = Trial::run(&context, paths, &caches, memory, executor)? else { return Ok(None) };
     // Photons of paths and caches have the light of merges, and no blur that lasts as long as the picture.
@@ -51,8 +52,8 @@ pub(super) fn choose<'a, F: Features>(
     let (best, finding) = trial.best(&goal, is_audited && may_have_cache(setup), products);
     let instead = match (best, light_paths) {
         (Best::Paths, _) | (Best::LightPaths, None) => None,
-        (Best::Cache, _) => Some(Method::IrradianceCache.into()),
-        (Best::RadianceCache, _) => Some(Method::RadianceCache.into()),
+        (Best::Cache(picture), _) => Some(Plan::with_cache(Method::IrradianceCache, picture)),
+        (Best::RadianceCache(picture), _) => Some(Plan::with_cache(Method::RadianceCache, picture)),
         (Best::LightPaths, Some(choice)) => {
             let method = if choice.counts.merging { Method::VertexMerging } else { Method::Bidirectional };
             Some(Plan::with_counts(method, choice))

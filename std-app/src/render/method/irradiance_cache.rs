@@ -19,6 +19,7 @@ use halflight_core::cache::irradiance::IrradianceCache;
 use halflight_core::findings::Decision::{LeftOut, Limited, Used};
 use halflight_core::findings::{Finding, Findings, Value};
 use halflight_core::memory::{Footprint, Line};
+use halflight_core::method::cache_resolution::CachedPicture;
 use halflight_core::method::caustics::{
     self, CausticEmission, CausticPhotons, CausticSettings, CausticUse, Decision, Prepass, least_footprint,
     prepass,
@@ -88,14 +89,12 @@ pub(super) struct Cached<'m, F> {
     loaded: [Half; 2],
     /// File to which caches are written.
     kept: RewrittenFile<'m>,
-    /// Gather rays of a record.
-    rays: u32,
 }
 
 impl<'m, F: Features> Cached<'m, F> {
     /// Runs the prepass for caustics, allocates memory and sets up the method.
     pub(super) fn new(
-        chosen: Method,
+        (chosen, picture): (Method, Option<CachedPicture>),
         setup: &RenderSetup<'m>,
         memory: &mut Memory<'m>,
     ) -> Result<Self, RenderError> {
@@ -105,7 +104,7 @@ impl<'m, F: Features> Cached<'m, F> {
         memory.set_aside(LOADED, Footprint::default().slice::<u8>(header.bytes() as usize))?;
         let loaded = file.map(Reader::load).transpose()?.unwrap_or_default();
         let fewest = loaded.iter().map(|half| half.records.len()).max().unwrap_or(0);
-        let cache = core_settings::<F>(chosen, setup, fewest);
+        let cache = CacheSettings { picture, ..core_settings::<F>(chosen, setup, fewest) };
         let (emission, caustics) = find_caustics::<F>(setup, memory, &cache)?;
         let scratch = scratch::<F>(&cache, emission.is_some());
         let scratch = memory.take_each("paths", scratch, workers.count())?;
@@ -148,7 +147,6 @@ impl<'m, F: Features> Cached<'m, F> {
             loaded: header.halves,
             header,
             kept: RewrittenFile::in_file(settings.save_cache.as_deref()),
-            rays: cache.strata.pow(2) as u32,
         })
     }
 
@@ -189,7 +187,8 @@ impl<'m, F: Features> Cached<'m, F> {
 
     /// Finding on the caches.
     fn finding(&self) -> Finding {
-        let settings = &self.setup.settings.cache;
+        let metric = self.setup.settings.cache.metric;
+        let resolution = self.method.resolution();
         let caches = self.method.caches();
         let sum = |of: fn(&IrradianceCache) -> u64| caches.iter().map(|cache| of(cache)).sum::<u64>();
         let both = |halves: [u32; 2]| halves.into_iter().map(u64::from).sum::<u64>();
@@ -207,9 +206,9 @@ impl<'m, F: Features> Cached<'m, F> {
         let gathered = both(self.method.gathered()) - both(self.loaded.map(|half| half.gathered));
         Finding::new("irradiance_cache", decision, reason)
             .timed("cache")
-            .with("metric", Value::Name(settings.metric.name()))
-            .with("error", Value::Number(settings.allowed().into()))
-            .with("rays_per_record", Value::Count(self.rays.into()))
+            .with("metric", Value::Name(metric.name()))
+            .with("error", Value::Number(resolution.error.into()))
+            .with("rays_per_record", Value::Count(resolution.strata.pow(2).into()))
             .with("records", Value::Count(sum(|cache| cache.records().len() as u64)))
             .with("capacity", Value::Count(sum(|cache| cache.capacity() as u64)))
             .with("gathered", Value::Count(gathered))
@@ -367,6 +366,7 @@ fn core_settings<F: Features>(chosen: Method, setup: &RenderSetup, fewest: usize
         // Records saved to a file keep their validity radii.
         widens: settings.save_cache.is_none(),
         lobes: (chosen == Method::RadianceCache).then_some(settings.lobes),
+        picture: None,
     }
 }
 

@@ -35,6 +35,7 @@ use halflight_core::bvh::Bvh;
 use halflight_core::findings::{Findings, Value};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Footprint, Line, OutOfMemory};
+use halflight_core::method::cache_resolution::CachedPicture;
 use halflight_core::method::caustics::CausticPathTracing;
 use halflight_core::method::choice::Goal;
 use halflight_core::method::counts::Choice;
@@ -58,6 +59,8 @@ pub(super) struct Plan<'a, F> {
     paths: Option<Box<CausticPathTracing<'a, F>>>,
     /// Counts of bidirectional techniques.
     counts: Option<Choice>,
+    /// Prediction of a picture with a cache.
+    picture: Option<CachedPicture>,
     /// Findings of the prepasses.
     findings: Findings,
 }
@@ -65,7 +68,7 @@ pub(super) struct Plan<'a, F> {
 impl<F> From<Method> for Plan<'_, F> {
     fn from(method: Method) -> Self {
         let findings = Findings::default();
-        Self { method, reported: method, is_open: false, paths: None, counts: None, findings }
+        Self { method, reported: method, is_open: false, paths: None, counts: None, picture: None, findings }
     }
 }
 
@@ -82,6 +85,11 @@ impl<F> Plan<'_, F> {
         finding.reason = "the chosen method cannot reach the requested error: path tracing takes its place";
         let findings = finding.with("given_up", Value::Name(picture.method.name())).into();
         Self { findings, ..Method::Path.into() }
+    }
+
+    /// A method with a cache that suits the predicted `picture`.
+    fn with_cache(method: Method, picture: CachedPicture) -> Self {
+        Self { picture: Some(picture), ..method.into() }
     }
 
     /// A bidirectional method with the counts of `choice`.
@@ -112,7 +120,8 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
             instead => return Ok(instead),
         },
         Method::IrradianceCache | Method::RadianceCache => {
-            Box::new(irradiance_cache::Cached::<F>::new(method, setup, memory)?)
+            let picture = plan.picture.or_else(|| setup.cached_picture()).filter(|_| setup.has_open_cache());
+            Box::new(irradiance_cache::Cached::<F>::new((method, picture), setup, memory)?)
         }
         Method::PhotonMap => {
             let scratch = PhotonMapping::<F>::scratch();
@@ -185,6 +194,22 @@ impl<'a> RenderSetup<'a> {
     pub(super) fn goal(&self) -> Goal {
         let stop = &self.settings.stop;
         Goal { rays: self.most_rays(), samples: stop.most_samples(), error: stop.error }
+    }
+
+    /// Whether rays and density of records may be chosen: neither settings nor files fix them.
+    pub(super) fn has_open_cache(&self) -> bool {
+        let Settings { cache, load_cache, save_cache, .. } = self.settings;
+        cache.is_open() && load_cache.is_none() && save_cache.is_none()
+    }
+
+    /// Picture of a requested cache, if time alone ends it.
+    fn cached_picture(&self) -> Option<CachedPicture> {
+        match self.goal() {
+            Goal { rays: Some(rays), samples: None, error: None } => {
+                Some(CachedPicture::of_time(rays / f64::from(self.settings.shard.count)))
+            }
+            _ => None,
+        }
     }
 
     /// Context for methods of the core.
