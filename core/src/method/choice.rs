@@ -1,11 +1,15 @@
 //! Choice of a method by predicted error.
 //!
-//! A trial renders 16 tiles with four samples per pixel: by path tracing, by path tracing in which an
+//! A trial renders 16 tiles with four to 32 samples per pixel: by path tracing, by path tracing in which an
 //! irradiance cache supplies the indirect light of diffuse surfaces, and by one in which records supply the
 //! light of rough lobes, too. It measures the variance and the rays of each. The difference of the variances,
 //! divided by the gather rays of a record, is the noise of interpolated light; it includes the difference of
 //! the estimators of direct light. Work is counted in rays and not in seconds: the choice follows from scene,
 //! settings, seed, memory and, where time is limited, the number of threads.
+
+mod goal;
+
+pub use goal::Goal;
 
 use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::caustics::{self, CausticPathTracing};
@@ -25,19 +29,8 @@ use crate::transport::path::reuse_pilot::PILOT_TILES;
 use crate::transport::path::{LightEstimator, WAVE};
 use crate::transport::{Counters, PathIntegrator, PathSettings, SuppliedLobes};
 
-/// Samples of a pixel in a trial.
-const SAMPLES: u32 = 4;
-
 /// Pixels of a block.
 const BLOCK: usize = 64;
-
-/// Rays of a trial, its greatest fraction of the work, and rays of a sample before a trial has counted them.
-const TRIAL_RAYS: f64 = 2.5e5;
-const TRIAL_SHARE: f64 = 0.25;
-const RAYS_PER_SAMPLE: f64 = 8.0;
-
-/// Fewest samples of a pixel for which pilots gain more than they cost.
-const FEWEST_SAMPLES: f64 = 4.0;
 
 /// Rays of the pilot of counts, and its greatest fraction of the work.
 const PILOT_RAYS: f64 = 5e5;
@@ -65,31 +58,6 @@ const ALL_IS_MISSING: f64 = 1.0;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
 const LEAST_GAIN: f64 = 1.15;
-
-/// End of a picture: the first of these that holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Goal {
-    /// Rays for which there is time.
-    pub rays: Option<f64>,
-    /// Samples per pixel of path tracing; of other methods as many as take the same work.
-    pub samples: Option<u32>,
-    /// relMSE.
-    pub error: Option<f64>,
-}
-
-impl Goal {
-    /// Whether there is time for pilots beside the first samples of `pixels` pixels.
-    pub fn affords_pilots(&self, pixels: usize) -> bool {
-        self.rays.is_none_or(|rays| rays > FEWEST_SAMPLES * RAYS_PER_SAMPLE * pixels as f64)
-    }
-
-    /// Whether a trial costs little beside a picture of `pixels` pixels.
-    pub fn affords_trial(&self, pixels: usize) -> bool {
-        let samples = self.samples.map(|samples| f64::from(samples) * pixels as f64 * RAYS_PER_SAMPLE);
-        let rays = [self.rays, samples].into_iter().flatten().fold(f64::INFINITY, f64::min);
-        rays > TRIAL_RAYS / TRIAL_SHARE && self.affords_pilots(pixels)
-    }
-}
 
 /// Method with the least predicted error or work.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -200,7 +168,7 @@ impl Trial {
     pub fn run<'m, F: Features>(
         context: &RenderContext,
         paths: &mut CausticPathTracing<F>,
-        caches: &TrialCaches,
+        (caches, goal): (&TrialCaches, &Goal),
         memory: &mut impl MemorySource<'m>,
         executor: &mut impl Executor,
     ) -> Result<Option<Self>, OutOfMemory> {
@@ -209,6 +177,7 @@ impl Trial {
         let tables = if F::GLOSSY && memory.has(tables) { tables } else { Footprint::default() };
         let (has_photons, reuse) = (paths.finding().used, paths.reuse());
         let mean = f64::from(paths.mean_radiance(executor)?);
+        let samples = goal.trial_samples(context.pixels());
         let (tiles, has_lobes) = memory.lend("lobes", tables, |_, arena| {
             let wide = match tables.bytes() {
                 0 => None,
@@ -224,14 +193,19 @@ impl Trial {
                 [SuppliedLobes::default(), supplied].map(|lobes| all.without_cached_light(lobes));
             let second = has_lobes.then_some(second);
             let tiles = match paths.photons() {
-                None => trace(&all, (&first, second.as_ref()), mean, executor)?,
+                None => trace(&all, (&first, second.as_ref()), (samples, mean), executor)?,
                 Some(photons) => photons.lend(|photons| match photons {
                     Some(photons) => {
                         let first = first.with_caustics(photons);
                         let second = second.map(|second| second.with_caustics(photons));
-                        trace(&all.with_caustics(photons), (&first, second.as_ref()), mean, executor)
+                        trace(
+                            &all.with_caustics(photons),
+                            (&first, second.as_ref()),
+                            (samples, mean),
+                            executor,
+                        )
                     }
-                    None => trace(&all, (&first, second.as_ref()), mean, executor),
+                    None => trace(&all, (&first, second.as_ref()), (samples, mean), executor),
                 })??,
             };
             Ok((tiles, has_lobes))
@@ -243,13 +217,13 @@ impl Trial {
         };
         let (pixels, shards) = (context.pixels() as f64, caches.shards.into());
         let (triangles, resolution) = (context.scene.mesh.triangles.len(), caches.resolution);
-        let trial = Self { reuse, pixels, triangles, resolution, shards, ..Self::of(&tiles) };
+        let trial = Self { reuse, pixels, triangles, resolution, shards, ..Self::of(&tiles, samples) };
         Ok(Some(Self { has_photons, has_lobes, ..trial }))
     }
 
-    /// Noise and work of `tiles`.
-    fn of(tiles: &[TileTrial]) -> Self {
-        let samples = f64::from(SAMPLES);
+    /// Noise and work of `tiles` with so many `samples` of each pixel.
+    fn of(tiles: &[TileTrial], samples: u32) -> Self {
+        let samples = f64::from(samples);
         let pixels = tiles.iter().map(|tile| tile.pixels).sum::<f64>().max(1.0);
         let sum = |of: &dyn Fn(&TileTrial) -> f64| tiles.iter().map(of).sum::<f64>();
         Self {
@@ -357,13 +331,13 @@ impl Trial {
     }
 }
 
-/// Traces the tiles of a trial in a picture with this `mean` radiance: by paths for all light, for that which
+/// Traces so many samples of the tiles of a trial in a picture with this `mean` radiance: by paths for all light, for that which
 /// no irradiance cache supplies, and for that which no record supplies; where no lobe is served, these are
 /// the same.
 fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
     all: &PathIntegrator<F, A>,
     (first, second): (&PathIntegrator<F, B>, Option<&PathIntegrator<F, B>>),
-    mean: f64,
+    (samples, mean): (u32, f64),
     executor: &mut impl Executor,
 ) -> Result<Option<[TileTrial; PILOT_TILES]>, OutOfMemory> {
     let mut tiles = [TileTrial::default(); PILOT_TILES];
@@ -374,7 +348,7 @@ fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
             pixels.fill(Pixel::default());
             let (of_all, rest) = pixels.split_at_mut(PIXELS_PER_TILE);
             let (of_first, of_second) = rest.split_at_mut(PIXELS_PER_TILE);
-            let samples = 0..SAMPLES;
+            let samples = 0..samples;
             out.rays[0] = all.run(tile, samples.clone(), WAVE, &mut arena, of_all)?.all_rays() as f64;
             let rays = first.run(tile, samples.clone(), WAVE, &mut arena, of_first)?.all_rays() as f64;
             out.rays[IRRADIANCE] = rays;
