@@ -1,6 +1,6 @@
 //! Choice of a method by predicted error.
 //!
-//! A trial renders 16 tiles with four to 32 samples per pixel: by path tracing, by path tracing in which an
+//! A trial renders 16 tiles with four samples per pixel: by path tracing, by path tracing in which an
 //! irradiance cache supplies the indirect light of diffuse surfaces, and by one in which records supply the
 //! light of rough lobes, too. It measures the variance and the rays of each. The difference of the variances,
 //! divided by the gather rays of a record, is the noise of interpolated light; it includes the difference of
@@ -28,6 +28,7 @@ use crate::transport::cached::view;
 use crate::transport::path::reuse_pilot::PILOT_TILES;
 use crate::transport::path::{LightEstimator, WAVE};
 use crate::transport::{Counters, PathIntegrator, PathSettings, SuppliedLobes};
+use goal::SAMPLES;
 
 /// Pixels of a block.
 const BLOCK: usize = 64;
@@ -168,7 +169,7 @@ impl Trial {
     pub fn run<'m, F: Features>(
         context: &RenderContext,
         paths: &mut CausticPathTracing<F>,
-        (caches, goal): (&TrialCaches, &Goal),
+        caches: &TrialCaches,
         memory: &mut impl MemorySource<'m>,
         executor: &mut impl Executor,
     ) -> Result<Option<Self>, OutOfMemory> {
@@ -177,7 +178,6 @@ impl Trial {
         let tables = if F::GLOSSY && memory.has(tables) { tables } else { Footprint::default() };
         let (has_photons, reuse) = (paths.finding().used, paths.reuse());
         let mean = f64::from(paths.mean_radiance(executor)?);
-        let samples = goal.trial_samples(context.pixels());
         let (tiles, has_lobes) = memory.lend("lobes", tables, |_, arena| {
             let wide = match tables.bytes() {
                 0 => None,
@@ -193,19 +193,14 @@ impl Trial {
                 [SuppliedLobes::default(), supplied].map(|lobes| all.without_cached_light(lobes));
             let second = has_lobes.then_some(second);
             let tiles = match paths.photons() {
-                None => trace(&all, (&first, second.as_ref()), (samples, mean), executor)?,
+                None => trace(&all, (&first, second.as_ref()), mean, executor)?,
                 Some(photons) => photons.lend(|photons| match photons {
                     Some(photons) => {
                         let first = first.with_caustics(photons);
                         let second = second.map(|second| second.with_caustics(photons));
-                        trace(
-                            &all.with_caustics(photons),
-                            (&first, second.as_ref()),
-                            (samples, mean),
-                            executor,
-                        )
+                        trace(&all.with_caustics(photons), (&first, second.as_ref()), mean, executor)
                     }
-                    None => trace(&all, (&first, second.as_ref()), (samples, mean), executor),
+                    None => trace(&all, (&first, second.as_ref()), mean, executor),
                 })??,
             };
             Ok((tiles, has_lobes))
@@ -217,13 +212,13 @@ impl Trial {
         };
         let (pixels, shards) = (context.pixels() as f64, caches.shards.into());
         let (triangles, resolution) = (context.scene.mesh.triangles.len(), caches.resolution);
-        let trial = Self { reuse, pixels, triangles, resolution, shards, ..Self::of(&tiles, samples) };
+        let trial = Self { reuse, pixels, triangles, resolution, shards, ..Self::of(&tiles) };
         Ok(Some(Self { has_photons, has_lobes, ..trial }))
     }
 
-    /// Noise and work of `tiles` with so many `samples` of each pixel.
-    fn of(tiles: &[TileTrial], samples: u32) -> Self {
-        let samples = f64::from(samples);
+    /// Noise and work of `tiles`.
+    fn of(tiles: &[TileTrial]) -> Self {
+        let samples = f64::from(SAMPLES);
         let pixels = tiles.iter().map(|tile| tile.pixels).sum::<f64>().max(1.0);
         let sum = |of: &dyn Fn(&TileTrial) -> f64| tiles.iter().map(of).sum::<f64>();
         Self {
@@ -331,13 +326,13 @@ impl Trial {
     }
 }
 
-/// Traces so many samples of the tiles of a trial in a picture with this `mean` radiance: by paths for all light, for that which
+/// Traces the tiles of a trial in a picture with this `mean` radiance: by paths for all light, for that which
 /// no irradiance cache supplies, and for that which no record supplies; where no lobe is served, these are
 /// the same.
 fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
     all: &PathIntegrator<F, A>,
     (first, second): (&PathIntegrator<F, B>, Option<&PathIntegrator<F, B>>),
-    (samples, mean): (u32, f64),
+    mean: f64,
     executor: &mut impl Executor,
 ) -> Result<Option<[TileTrial; PILOT_TILES]>, OutOfMemory> {
     let mut tiles = [TileTrial::default(); PILOT_TILES];
@@ -348,7 +343,7 @@ fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
             pixels.fill(Pixel::default());
             let (of_all, rest) = pixels.split_at_mut(PIXELS_PER_TILE);
             let (of_first, of_second) = rest.split_at_mut(PIXELS_PER_TILE);
-            let samples = 0..samples;
+            let samples = 0..SAMPLES;
             out.rays[0] = all.run(tile, samples.clone(), WAVE, &mut arena, of_all)?.all_rays() as f64;
             let rays = first.run(tile, samples.clone(), WAVE, &mut arena, of_first)?.all_rays() as f64;
             out.rays[IRRADIANCE] = rays;

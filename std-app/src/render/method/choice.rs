@@ -34,7 +34,7 @@ pub(super) fn choose<'a, F: Features>(
     let resolution = (!setup.has_open_cache()).then(|| settings.cache.resolution());
     let shards = settings.shard.count;
     let caches = TrialCaches { resolution, shards, lobes: settings.lobes };
-    let Some(trial) = Trial::run(&context, paths, (&caches, &goal), memory, executor)? else {
+    let Some(trial) = Trial::run(&context, paths, &caches, memory, executor)? else {
         return Ok(None);
     };
     // Photons of paths and caches have the light of merges, and no blur that lasts as long as the picture.
