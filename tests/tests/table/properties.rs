@@ -61,9 +61,11 @@ pub(super) fn agreement(row: &Row) {
         let means = pictures[0].len() - 3;
         let light = reference.image.mean().iter().sum::<f64>() / 3.0;
         let judge = |bias: f64, bias_of_mean: f64| {
-            agree_within(&pictures, &reference.values, METHODS.len() * SCENES.len(), |i, b| match i < means {
-                true => bias * (b + 0.1 * light),
-                false => bias_of_mean * b,
+            agree_within(&pictures, &reference.estimates, METHODS.len() * SCENES.len(), |i, b| {
+                match i < means {
+                    true => bias * (b + 0.1 * light),
+                    false => bias_of_mean * b,
+                }
             })
         };
         // Prints the smallest bias that passes, for the choice of a row's bias.
