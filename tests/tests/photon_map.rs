@@ -82,9 +82,9 @@ fn a_tenth_of_the_memory_holds_a_tenth_of_the_photons() {
     let bytes = |result: &RenderResult| {
         result.memory.iter().find(|one| one.structure == "photons").map_or(0, |one| one.bytes)
     };
-    let whole = mapped(&scene, 64, 64, |s| s.photons.global = Some(1 << 17));
+    let whole = mapped(&scene, 64, 32, |s| s.photons.global = Some(1 << 17));
     let limit = whole.memory_peak - bytes(&whole) * 9 / 10;
-    let tenth = mapped(&scene, 64, 64, |s| {
+    let tenth = mapped(&scene, 64, 32, |s| {
         s.photons.global = Some(1 << 17);
         s.memory = Some(limit);
     });
