@@ -1,5 +1,6 @@
 //! Agreement of a method with path tracing on one scene, by blocks of pixels and by the mean of the picture.
 
+use crate::references::reference;
 use crate::render::{blocks_of, render};
 use crate::scenes::SceneBuffers;
 use crate::statistics::agree_within;
@@ -7,6 +8,9 @@ use halflight::render::{Method, RenderResult, Settings};
 
 /// Independent pictures of each method.
 const REPLICAS: u32 = 8;
+
+/// Samples per pixel of a stored picture of path tracing, and of a picture of the other method.
+const SPP: [u32; 2] = [512, 32];
 
 /// Largest relative bias of the picture's mean.
 const BIAS_OF_MEAN: f64 = 0.003;
@@ -25,40 +29,42 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Asserts that 32 samples of `method` agree with 128 of path tracing; `check` sees each picture of the
-    /// method.
+    /// Asserts that pictures of `method` agree with the stored ones of path tracing in `scene`; `check` sees
+    /// each picture of the method.
     #[track_caller]
-    pub fn assert(&self, buffers: &SceneBuffers, method: Method, check: impl Fn(&RenderResult)) {
-        self.assert_with(buffers, method, |_| (), check);
+    pub fn assert(&self, scene: (&str, &SceneBuffers), method: Method, check: impl Fn(&RenderResult)) {
+        self.assert_with(scene, method, |_| (), check);
     }
 
     /// [`Agreement::assert`] with changed settings.
     #[track_caller]
     pub fn assert_with(
         &self,
-        buffers: &SceneBuffers,
+        (name, buffers): (&str, &SceneBuffers),
         method: Method,
         change: impl Fn(&mut Settings),
         check: impl Fn(&RenderResult),
     ) {
-        let values = |of, spp| -> Vec<Vec<f64>> {
+        let values = |method, spp, change: &dyn Fn(&mut Settings), check: &dyn Fn(&RenderResult)| {
             let one = |seed| {
-                let result = render(&buffers.scene(), of, self.size, spp, |s| {
+                let result = render(&buffers.scene(), method, self.size, spp, |s| {
                     s.seed = seed;
                     change(s);
                 });
                 assert_eq!(result.counters.dropped.total(), 0);
-                if of == method {
-                    check(&result);
-                }
+                check(&result);
                 let mut values = blocks_of(&result.image, self.block);
                 values.push(values.iter().sum::<f64>() / values.len() as f64);
                 values
             };
-            (0..REPLICAS).map(one).collect()
+            (0..REPLICAS).map(one).collect::<Vec<_>>()
         };
-        let (path, found) = (values(Method::Path, 128), values(method, 32));
-        let (last, light) = (path[0].len() - 1, path[0][path[0].len() - 1]);
+        let path = reference(&format!("{name}, blocks of {}", self.block), || {
+            values(Method::Path, SPP[0], &|_| (), &|_| ())
+        });
+        let found = values(method, SPP[1], &change, &check);
+        let last = path.moments.len() - 1;
+        let light = path.moments[last].0;
         let allowed =
             |i: usize, b: f64| if i < last { self.bias * (b + 0.1 * light) } else { BIAS_OF_MEAN * b };
         agree_within(&found, &path, self.comparisons, allowed).unwrap_or_else(|why| panic!("{why}"));

@@ -62,6 +62,22 @@ pub fn agree(a: &[Vec<f64>], b: &[Vec<f64>], widest: f64) -> Result<(), String> 
     Ok(())
 }
 
+/// Mean of each value over independent pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimates {
+    /// Number of pictures.
+    pub pictures: usize,
+    /// Each value's mean, and the variance of that mean.
+    pub moments: Vec<(f64, f64)>,
+}
+
+impl Estimates {
+    /// Those of `pictures`, each a list of values.
+    pub fn of(pictures: &[Vec<f64>]) -> Self {
+        Self { pictures: pictures.len(), moments: moments(pictures) }
+    }
+}
+
 /// As [`agree`], with a bias of up to `allowed(i, b)` in value `i` of `a`, where `b` is the mean of the other
 /// set. The significance level is shared among the values and `comparisons` comparisons.
 ///
@@ -69,14 +85,16 @@ pub fn agree(a: &[Vec<f64>], b: &[Vec<f64>], widest: f64) -> Result<(), String> 
 /// Text about the worst value.
 pub fn agree_within(
     a: &[Vec<f64>],
-    b: &[Vec<f64>],
+    b: &Estimates,
     comparisons: usize,
     allowed: impl Fn(usize, f64) -> f64,
 ) -> Result<(), String> {
-    let count = comparisons * a[0].len();
+    let a = Estimates::of(a);
+    assert_eq!(a.moments.len(), b.moments.len(), "values");
+    let count = comparisons * a.moments.len();
     let each = 1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / count as f64);
-    let [of_a, of_b] = [a, b].map(|lot| (lot.len() - 1) as f64);
-    let moments = moments(a).into_iter().zip(moments(b)).enumerate();
+    let [of_a, of_b] = [&a, b].map(|lot| (lot.pictures - 1) as f64);
+    let moments = a.moments.iter().copied().zip(b.moments.iter().copied()).enumerate();
     let all = moments.map(|(i, ((a, va), (b, vb)))| {
         // Welch 1947; at least the degrees of freedom of the smaller set.
         let freedom = (va + vb).powi(2) / (va * va / of_a + vb * vb / of_b);
@@ -146,7 +164,7 @@ mod tests {
     #[test]
     fn a_bias_up_to_what_is_allowed_is_none() {
         let lot = |mean: f64| (0..16).map(|i| vec![mean + 0.001 * f64::from(i % 4)]).collect::<Vec<_>>();
-        let judged = |mean| agree_within(&lot(mean), &lot(1.0), 1, |_, b| 0.1 * b);
+        let judged = |mean| agree_within(&lot(mean), &Estimates::of(&lot(1.0)), 1, |_, b| 0.1 * b);
         assert!(
             judged(1.09).is_ok()
                 && judged(0.91).is_ok()

@@ -5,6 +5,7 @@ use glam::Vec3;
 use halflight::render::Method;
 use halflight::save::Image;
 use halflight_core::scene::{Camera, Material, Scene};
+use halflight_tests::references::reference;
 use halflight_tests::render::{blocks_of, number, render};
 use halflight_tests::rooms::{black, boxes_in_black, diffuse, lamp, needles, room, sheet, spot};
 use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, metal};
@@ -31,10 +32,13 @@ const BIAS: f64 = 0.08;
 /// Largest relative bias of the picture's mean.
 const BIAS_OF_MEAN: f64 = 0.01;
 
+/// Samples per pixel of a stored picture of path tracing, and of a picture of the cache.
+const SPP: [u32; 2] = [512, 16];
+
 /// Asserts that block means of the cache agree with path tracing within the noise of both, a bias of `bias`
 /// per block and of `bias_of_mean` for the picture.
 #[track_caller]
-fn agrees(scene: &Scene, bias: f64, bias_of_mean: f64) {
+fn agrees(name: &str, scene: &Scene, bias: f64, bias_of_mean: f64) {
     let values = |method, spp| -> Vec<Vec<f64>> {
         let one = |seed| {
             let result = render(scene, method, 48, spp, |s| (s.seed, s.cache.strata) = (seed, Some(16)));
@@ -45,8 +49,10 @@ fn agrees(scene: &Scene, bias: f64, bias_of_mean: f64) {
         };
         (0..REPLICAS).map(one).collect()
     };
-    let (path, cache) = (values(Method::Path, 128), values(Method::IrradianceCache, 16));
-    let (last, light) = (path[0].len() - 1, path[0][path[0].len() - 1]);
+    let path = reference(&format!("{name}, blocks of 6"), || values(Method::Path, SPP[0]));
+    let cache = values(Method::IrradianceCache, SPP[1]);
+    let last = path.moments.len() - 1;
+    let light = path.moments[last].0;
     let allowed = |i: usize, b: f64| if i < last { bias * (b + 0.1 * light) } else { bias_of_mean * b };
     let least = (0..100).map(|i| f64::from(i) / 200.0).find(|b| {
         agree_within(&cache, &path, COMPARISONS, |i, l| if i < last { b * (l + 0.1 * light) } else { l })
@@ -58,19 +64,19 @@ fn agrees(scene: &Scene, bias: f64, bias_of_mean: f64) {
 
 #[test]
 fn a_sheet_between_light_and_dark_has_two_sides() {
-    agrees(&sheet().scene(), BIAS, BIAS_OF_MEAN);
+    agrees("sheet", &sheet().scene(), BIAS, BIAS_OF_MEAN);
 }
 
 #[test]
 fn a_black_room_has_no_indirect_light_except_on_white_boxes() {
     let image = picture(&black().scene(), Method::IrradianceCache, 16);
     assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
-    agrees(&boxes_in_black().scene(), BIAS, BIAS_OF_MEAN);
+    agrees("boxes in black", &boxes_in_black().scene(), BIAS, BIAS_OF_MEAN);
 }
 
 #[test]
 fn a_small_bright_spot_lights_a_room() {
-    agrees(&spot().scene(), BIAS, BIAS_OF_MEAN);
+    agrees("spot", &spot().scene(), BIAS, BIAS_OF_MEAN);
 }
 
 /// Gather rays of the first records continue as paths, whose light of many bounces is noisy. Such records are
@@ -102,7 +108,7 @@ fn a_court_under_a_sky_has_its_light_once() {
     let [few, more] = [1, 3].map(asked);
     let each = (more.shadow_rays - few.shadow_rays) as f64 / (more.paths - few.paths) as f64;
     assert!(each > 2.0, "{each} shadow rays for each path");
-    agrees(&scene, 0.03, 0.003);
+    agrees("court", &scene, 0.03, 0.003);
 }
 
 /// Only a wall of brushed metal is visible: its light comes from surfaces that no pixel sees.
@@ -124,12 +130,12 @@ fn a_room_is_seen_in_brushed_metal() {
     let [few, many] = [&cache, &path].map(|result| result.error.unwrap().relmse);
     println!("{few:.2e} {many:.2e}, {:?}", cache.findings);
     assert!(few < 0.5 * many && number(&cache, "irradiance_cache", "records") > 50.0, "{few} {many}");
-    agrees(&scene, BIAS, BIAS_OF_MEAN);
+    agrees("brushed metal", &scene, BIAS, BIAS_OF_MEAN);
 }
 
 #[test]
 fn thin_bars_cast_their_shadows() {
-    agrees(&needles().scene(), BIAS, BIAS_OF_MEAN);
+    agrees("needles", &needles().scene(), BIAS, BIAS_OF_MEAN);
 }
 
 /// Gather rays along the wall pass below the board; strata detect geometry that overhangs the wall.

@@ -30,6 +30,7 @@ mod load_collection;
 mod load_meaning;
 mod load_names;
 mod load_support;
+mod lobe_rooms;
 mod photon_map;
 mod picture;
 mod radiance_cache;

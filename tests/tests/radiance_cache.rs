@@ -20,7 +20,7 @@ fn cached(buffers: &SceneBuffers, change: impl FnOnce(&mut Settings)) -> RenderR
 #[test]
 fn the_box_agrees_with_path_tracing() {
     let agreement = Agreement { size: SIZE, block: 6, bias: 0.08, comparisons: 2 };
-    agreement.assert(&rough_box(), Method::RadianceCache, |_| ());
+    agreement.assert(("rough box", &rough_box()), Method::RadianceCache, |_| ());
 }
 
 /// The method of Křivánek et al. (2005), with our radii and with those by distances.
@@ -30,13 +30,13 @@ fn the_box_by_spherical_harmonics_agrees_with_path_tracing() {
     let check = |result: &RenderResult| {
         assert_eq!(finding(result, "radiance_records").decision, Decision::Used);
     };
-    agreement.assert_with(&rough_box(), Method::RadianceCache, harmonics, check);
+    agreement.assert_with(("rough box", &rough_box()), Method::RadianceCache, harmonics, check);
     let by_distances = |settings: &mut Settings| {
         harmonics(settings);
         settings.cache.metric = Metric::SplitSphere;
         settings.cache.error = Some(0.15);
     };
-    agreement.assert_with(&rough_box(), Method::RadianceCache, by_distances, check);
+    agreement.assert_with(("rough box", &rough_box()), Method::RadianceCache, by_distances, check);
 }
 
 fn harmonics(settings: &mut Settings) {

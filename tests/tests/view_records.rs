@@ -16,9 +16,9 @@ fn cached(buffers: &SceneBuffers, change: impl FnOnce(&mut Settings)) -> RenderR
 /// Pictures with records agree with those of path tracing, which many comparisons are made of. The bias of a
 /// block of 4 × 4 pixels is a sixth at most.
 #[track_caller]
-fn agrees(buffers: &SceneBuffers, comparisons: usize) {
+fn agrees(name: &str, buffers: &SceneBuffers, comparisons: usize) {
     let agreement = Agreement { size: SIZE, block: 4, bias: 1.0 / 6.0, comparisons };
-    agreement.assert(buffers, Method::RadianceCache, |result| {
+    agreement.assert((name, buffers), Method::RadianceCache, |result| {
         assert!(number(result, "view_bound_records", "records") > 20.0);
     });
 }
@@ -26,15 +26,15 @@ fn agrees(buffers: &SceneBuffers, comparisons: usize) {
 #[test]
 fn floors_and_blocks_of_narrow_lobes_agree_with_path_tracing() {
     let roughness = |alpha: f32| alpha.sqrt();
-    agrees(&box_from_above(metal(roughness(0.1)), varnish(roughness(0.2))), 2);
-    agrees(&box_from_above(varnish(roughness(0.1)), metal(roughness(0.2))), 2);
+    agrees("metal box with varnish", &box_from_above(metal(roughness(0.1)), varnish(roughness(0.2))), 2);
+    agrees("varnished box with metal", &box_from_above(varnish(roughness(0.1)), metal(roughness(0.2))), 2);
 }
 
 /// A record beside a leg knows nothing of its sunny side: a boundary or a neighbour has to limit it.
 #[test]
 fn a_table_in_the_sun_agrees_with_path_tracing() {
-    agrees(&table_in_the_sun(metal(0.1f32.sqrt())), 2);
-    agrees(&table_in_the_sun(varnish(0.1f32.sqrt())), 2);
+    agrees("metal table in the sun", &table_in_the_sun(metal(0.1f32.sqrt())), 2);
+    agrees("varnished table in the sun", &table_in_the_sun(varnish(0.1f32.sqrt())), 2);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::scenes::TableScene;
 use halflight::render::{Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_tests::render::render;
-use halflight_tests::statistics::blocks;
+use halflight_tests::statistics::{Estimates, blocks};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -67,8 +67,8 @@ pub(super) fn values(image: &Image) -> Vec<f64> {
 pub(super) struct Reference {
     /// Mean of all pictures.
     pub(super) image: Image,
-    /// Values of each picture.
-    pub(super) values: Vec<Vec<f64>>,
+    /// Values that tests judge.
+    pub(super) estimates: Estimates,
     /// Expected relMSE from the noise of `image`.
     pub(super) relmse: f64,
 }
@@ -97,8 +97,8 @@ impl Reference {
             }));
         }
         relmse /= 3.0 * pixels.len() as f64;
-        let values = images.iter().map(values).collect();
-        Self { image: Image { pixels, ..images[0] }, values, relmse }
+        let estimates = Estimates::of(&images.iter().map(values).collect::<Vec<_>>());
+        Self { image: Image { pixels, ..images[0] }, estimates, relmse }
     }
 
     /// relMSE of a picture against the reference, less the expected part of the reference's noise.
