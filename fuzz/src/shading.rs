@@ -11,6 +11,7 @@ use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
 use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::{Row, Row3};
@@ -169,6 +170,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         dielectric: metal,
     };
     check_coats(&mut rows, input.arbitrary()?, &surface, &coats, &specular);
+    check_sky(&mut rows, active, flags & 2 == 0);
     for level in Level::detect().and_below() {
         let mut found = SurfaceBlock::EMPTY;
         surfaces.compute(level, &mut found);
@@ -210,6 +212,27 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         check_records("camera ray", 0xffff, &found, &camera.reference());
     }
     Ok(())
+}
+
+/// Samples of the environment at every level against their scalar reference.
+fn check_sky(rows: &mut Rows, active: u32, is_map: bool) {
+    let sky = SkyBlock {
+        at: [rows.unit(), rows.unit()],
+        density: rows.row(),
+        factors: [rows.row(), rows.row()],
+        normal: rows.vectors(),
+    };
+    let [x, y, z] = rows.vectors().map(|[a, b, c, ..]| [a, b, c]);
+    let samples = SkySamples { sky: &sky, to_world: is_map.then_some([x, y, z]), active };
+    let before = (rows.vectors(), rows.row());
+    let (mut direction, mut pdf) = before;
+    let set = samples.reference(&mut direction, &mut pdf);
+    for level in Level::detect().and_below() {
+        let mut found = before;
+        assert_eq!(samples.compute(level, &mut found.0, &mut found.1), set, "{level:?}");
+        check("sky direction", 0xffff, &found.0, &direction);
+        check("sky density", 0xffff, &[found.1], &[pdf]);
+    }
 }
 
 /// Coats and smooth surfaces at every level against their scalar references.

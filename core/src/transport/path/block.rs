@@ -14,6 +14,7 @@ use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
 use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
 use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
+use halflight_simd::kernels::shade::sky::SkyBlock;
 use halflight_simd::kernels::shade::specular::SpecularBlock;
 use halflight_simd::kernels::shade::surface::SurfaceBlock;
 use halflight_simd::kernels::shade::{Row, Row3, at, put};
@@ -34,6 +35,7 @@ pub(super) struct Block<'a> {
     pub(super) numbers: VertexNumbers,
     pub(super) emitters: EmitterBlock,
     pub(super) probability: Row,
+    pub(super) sky: SkyBlock,
     pub(super) light: LightBlock,
     pub(super) value: Row3,
     pub(super) pdf: Row,
@@ -121,6 +123,7 @@ impl<'a> Block<'a> {
             numbers: VertexNumbers::EMPTY,
             emitters: EmitterBlock::EMPTY,
             probability: [0.0; BLOCK],
+            sky: SkyBlock::EMPTY,
             light: LightBlock::EMPTY,
             value: [[0.0; BLOCK]; 3],
             pdf: [0.0; BLOCK],
@@ -245,14 +248,8 @@ impl<'a> Block<'a> {
     }
 }
 
-/// Stores a light sample of the vertex `i` at `position`; `balance`: weighted by the balance heuristic.
-pub(super) fn put_light(
-    light: &mut LightBlock,
-    i: usize,
-    sample: &LightSample,
-    position: Vec3,
-    balance: bool,
-) {
+/// Stores a light sample of the vertex `i` at `position`.
+pub(super) fn put_light(light: &mut LightBlock, i: usize, sample: &LightSample, position: Vec3) {
     let LightSample { direction, distance, target, radiance, pdf, delta, .. } = *sample;
     put(&mut light.direction, i, direction.to_array());
     put(&mut light.radiance, i, radiance.to_array());
@@ -268,7 +265,6 @@ pub(super) fn put_light(
     light.bounded |= u32::from(end.is_some()) << i;
     light.area |= u32::from(target.is_some()) << i;
     light.alone |= u32::from(delta) << i;
-    light.balance |= u32::from(balance) << i;
 }
 
 #[cfg(test)]

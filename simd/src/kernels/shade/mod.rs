@@ -15,6 +15,7 @@ pub mod ggx;
 pub mod numbers;
 pub mod rectangle;
 pub mod scatter;
+pub mod sky;
 pub mod specular;
 pub mod surface;
 pub mod triangle;

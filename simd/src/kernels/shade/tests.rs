@@ -8,6 +8,7 @@ use super::direct::{Direct, LightBlock, ShadowBlock};
 use super::emitter::{EmitterBlock, EmitterSamples};
 use super::numbers::{mix, unit_float};
 use super::scatter::{NextBlock, Scatter, ScatterBlock};
+use super::sky::{SkyBlock, SkySamples};
 use super::specular::{SpecularBlock, SpecularSamples};
 use super::surface::{SurfaceBlock, Surfaces};
 use super::{Row, Row3, at, put};
@@ -359,6 +360,39 @@ fn smooth_surfaces_agree_with_the_reference_on_every_level() {
         }
     }
     assert!(counts.iter().all(|&count| count > 200), "{counts:?}");
+}
+
+#[test]
+fn environment_samples_agree_with_the_reference_on_every_level() {
+    let mut random = Random(7);
+    let mut counts = [0; 2];
+    for round in 0..400 {
+        let mut sky = SkyBlock {
+            at: [random.row(0.0, 1.0), random.row(0.0, 0.5)],
+            density: random.row(0.0, 4.0),
+            factors: [random.row(0.5, 2.0), random.row(0.1, 1.0)],
+            normal: random.directions(),
+        };
+        // The pole of the map, a black cell, and all directions.
+        (sky.at[1][1], sky.density[2]) = (0.0, 0.0);
+        put(&mut sky.normal, 5, [0.0; 3]);
+        let turned = at(&random.directions(), 0);
+        let to_world = (round % 2 == 0).then_some([turned, [0.0, 1.0, 0.0], [-0.0, 0.6, 0.8]]);
+        let samples = SkySamples { sky: &sky, to_world, active: random.bits() };
+        let before = (random.vectors(), random.row(0.0, 1.0));
+        let mut wanted = before;
+        let set = samples.reference(&mut wanted.0, &mut wanted.1);
+        counts[round % 2] += set.count_ones();
+        for level in Level::detect().and_below() {
+            let mut found = before;
+            assert_eq!(samples.compute(level, &mut found.0, &mut found.1), set, "{level:?}");
+            let bits = |(direction, pdf): &(Row3, Row)| {
+                (direction.map(|r| r.map(f32::to_bits)), pdf.map(f32::to_bits))
+            };
+            assert_eq!(bits(&found), bits(&wanted), "{level:?}");
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 1000), "{counts:?}");
 }
 
 #[test]

@@ -11,6 +11,7 @@ use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers, pair, place_key, single};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
 use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::{Row, Row3, at};
@@ -29,6 +30,7 @@ pub(super) const KERNELS: &[Kernel] = &[
     Kernel { name: "numbers of a vertex", run: |blocks, i, level| blocks.0[i].numbers(level) },
     Kernel { name: "numbers of a light sample", run: |blocks, i, level| blocks.0[i].light_numbers(level) },
     Kernel { name: "near rectangle lights", run: |blocks, i, level| blocks.0[i].light(level) },
+    Kernel { name: "samples of a sky map", run: |blocks, i, level| blocks.0[i].sky(level) },
     Kernel { name: "light on diffuse", run: |blocks, i, level| blocks.0[i].direct(DIFFUSE, level) },
     Kernel { name: "light on rough metal", run: |blocks, i, level| blocks.0[i].direct(METAL, level) },
     Kernel { name: "viewers of coats", run: |blocks, i, level| blocks.0[i].see(level) },
@@ -232,6 +234,18 @@ impl Block {
             active: 0xffff,
         };
         black_box(level.map_or_else(|| samples.reference(), |level| samples.compute(level)));
+    }
+
+    fn sky(&self, level: Option<Level>) {
+        let sky = SkyBlock { at: self.numbers.light, ..SkyBlock::EMPTY };
+        let to_world = Some([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        let samples = SkySamples { sky: &sky, to_world, active: 0xffff };
+        let (mut direction, mut pdf) = (self.ones, self.ones[0]);
+        black_box(match level {
+            None => samples.reference(&mut direction, &mut pdf),
+            Some(level) => samples.compute(level, &mut direction, &mut pdf),
+        });
+        black_box((&direction, &pdf));
     }
 
     fn direct(&self, bsdf: usize, level: Option<Level>) {

@@ -4,7 +4,7 @@ use super::Estimated;
 use crate::Rgb;
 use crate::bsdf::{COATS, Features};
 use crate::geometry::Ray;
-use crate::light::emitted;
+use crate::light::{ChosenLight, emitted};
 use crate::sampling::Sampler;
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::block::{Block, Set, Stages, put_light};
@@ -160,11 +160,19 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             // A visibility table holds for one side only.
             let table = if side == Vec3::ZERO { None } else { lights.visibility(position, side) };
             let warped = table.map(|table| table.warp(u));
-            let sample = lights.sample_chosen(scene, position, side, u, chosen, warped);
-            if let Some((sample, later)) = sample {
-                put_light(&mut block.light, i, &sample, position, later && lights.has_visibility());
-                environment |= u32::from(later) << i;
+            if let ChosenLight::Environment { probability } = chosen {
+                let is_put = lights.put_environment(&mut block.sky, i, (side, u), warped, probability);
+                environment |= u32::from(is_put) << i;
+                continue;
             }
+            let sample = lights.sample_chosen(scene, position, side, u, chosen, warped);
+            if let Some((sample, _)) = sample {
+                put_light(&mut block.light, i, &sample, position);
+            }
+        }
+        if environment != 0 {
+            let scene = (scene, self.context.level);
+            environment = lights.sample_environments(scene, &block.sky, &mut block.light, environment);
         }
         if areas != 0 {
             self.sample_areas(block, areas);
