@@ -117,8 +117,8 @@ impl<'m> LightSampler<'m> {
         self.environment.is_some_and(|environment| environment.put(block, i, u))
     }
 
-    /// Samples the environment at the vertices of `active`, into the block of lights. The radiance is still to be
-    /// multiplied by that of the environment. Returns the set of samples.
+    /// Samples the environment at the vertices of `active`, into the block of lights. The radiance is still to
+    /// be multiplied by that of the environment. Returns the set of samples.
     #[inline]
     pub(crate) fn sample_environments(
         &self,
@@ -128,7 +128,7 @@ impl<'m> LightSampler<'m> {
         active: u32,
     ) -> u32 {
         let (Some(sampler), Some(environment)) = (&self.environment, &scene.environment) else { return 0 };
-        let samples = SkySamples { sky, to_world: sampler.to_world(environment), active };
+        let samples = SkySamples { sky, to_world: sampler.map_to_world(environment), active };
         let exists = samples.compute(level, &mut light.direction, &mut light.pdf);
         (0..BLOCK).filter(|i| exists >> i & 1 == 1).for_each(|i| put(&mut light.radiance, i, [1.0; 3]));
         light.exists |= exists;

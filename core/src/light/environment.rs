@@ -196,7 +196,7 @@ impl<'m> EnvironmentSampler<'m> {
 
     /// Columns of the rotation from the map to the world; `None` without a map.
     #[inline]
-    pub(super) fn to_world(&self, environment: &Environment) -> Option<[[f32; 3]; 3]> {
+    pub(super) fn map_to_world(&self, environment: &Environment) -> Option<[[f32; 3]; 3]> {
         self.map.map(|_| environment.to_map.transpose().to_cols_array_2d())
     }
 

@@ -3,8 +3,8 @@
 //! 2001).
 //!
 //! A microfacet of a dielectric coat reflects tint · F + metal + (metallic - metal) · S, with Fresnel's F and
-//! S = (1 - c)^5; one of a coat of Schlick reflects metal + (1 - metal) · S. The part of a coat that depends on
-//! the viewer is computed once a vertex.
+//! S = (1 - c)^5. One of a coat of Schlick reflects metal + (1 - metal) · S. The part of a coat that depends
+//! on the viewer is computed once a vertex.
 
 use super::bsdf::viewer;
 use super::coat_tables::{AMPLITUDES, CoatTables, LAST_AMPLITUDE, STEP, TablePlace, lerp, place, unit};

@@ -31,7 +31,8 @@ pub(super) fn lerp<L: Lanes>(a: L, b: L, t: L) -> L {
     a + (b - a) * t
 }
 
-/// Position of `x` in 0 … 1 among `nodes` nodes: the node below, and the fraction of the distance to the next.
+/// Position of `x` in 0 … 1 among `nodes` nodes: the node below, and the fraction of the distance to the
+/// next.
 #[inline(always)]
 pub(super) fn place<L: Lanes>(x: L, nodes: usize) -> [L; 2] {
     let at = unit(x) * x.all((nodes - 1) as f32);

@@ -1,5 +1,5 @@
-//! Samples of the environment at the vertices of a block, over lanes: a point of a map becomes a direction, or
-//! a point of the unit square a direction of a sky of constant radiance.
+//! Samples of the environment at the vertices of a block, over lanes: directions of points of a map, or of a
+//! sky of constant radiance.
 
 use super::vector::{self, add, scale};
 use super::warp::{self, sin_cos_turns};

@@ -1,9 +1,10 @@
 //! Shading of blocks of vertices in lanes, by the kernels of `halflight_simd::kernels::shade`.
 //!
 //! A stage is either a kernel over all vertices of the block or a loop over them. Loops gather inputs, look
-//! up materials, textures and estimators, and replace the kernels at rare vertices: normal maps, degenerate
-//! triangles, rough dielectrics, lights other than area lights. Vertices at which an estimator separates the coat or weighs samples are shaded one by one (`path/shade.rs`). Both compute the
-//! same bits.
+//! up materials, textures, cells of an environment map and estimators, and replace the kernels at rare
+//! vertices: normal maps, degenerate triangles, rough dielectrics, textured, point and directional lights.
+//! Vertices at which an estimator separates the coat or weighs samples are shaded one by one
+//! (`path/shade.rs`). Both compute the same bits.
 
 mod direct;
 mod scatter;
