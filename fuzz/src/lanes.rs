@@ -146,6 +146,7 @@ struct Packed {
     fields: [[f32; 16]; 3],
     bytes: [f32; 16],
     picked: [f32; 16],
+    neighbours: [[f32; 16]; 2],
     powers: [f32; 16],
     smallest: f32,
 }
@@ -156,6 +157,13 @@ const FIELDS: [(u32, u32); 3] = [(0, 12), (22, 10), (8, 24)];
 /// Numbers in [0, 16).
 fn places(words: &[u32; 16]) -> [f32; 16] {
     words.map(|word| (word >> 8 & 0xffff) as f32 / 4096.0)
+}
+
+/// A table that ends below the largest places.
+const TABLE: [i16; 11] = [0, 1, -1, i16::MAX, i16::MIN, 7, -300, 2, 9, -4, 5];
+
+fn entry(place: usize, next: usize) -> f32 {
+    TABLE[place.min(TABLE.len() - 2) + next].into()
 }
 
 fn low_bytes(words: &[u32; 16]) -> [u8; 16] {
@@ -176,6 +184,7 @@ impl Kernel for Packing {
             fields: FIELDS.map(|(from, width)| simd.field16(&words, from, width).to_array()),
             bytes: simd.bytes16(&low_bytes(&words)).to_array(),
             picked: simd.pick16(simd.load16(&operands.a), simd.load16(&places(&words))).to_array(),
+            neighbours: simd.load16(&places(&words)).neighbours(&TABLE).map(|lanes| lanes.to_array()),
             powers: simd.powers16(&words).to_array(),
             smallest: simd.load16(&operands.a).smallest(),
         }
@@ -198,6 +207,8 @@ impl Packed {
         assert_eq!(self.bytes, low_bytes(words).map(f32::from), "{level:?} bytes");
         let picked = places(words).map(|place| operands.a[place as usize].to_bits());
         assert_eq!(bits(&self.picked), picked, "{level:?} pick");
+        let neighbours = [0, 1].map(|next| places(words).map(|place| entry(place as usize, next)));
+        assert_eq!(self.neighbours, neighbours, "{level:?} neighbours");
         assert_eq!(bits(&self.powers), words.map(|word| word >> 24 << 23), "{level:?} powers");
         if operands.a.iter().all(|a| !a.is_nan()) {
             let smallest = operands.a.iter().copied().fold(f32::INFINITY, f32::min);

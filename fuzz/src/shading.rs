@@ -5,10 +5,14 @@ use arbitrary::{Result, Unstructured};
 use halflight_simd::Level;
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
+use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
+use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::{Row, Row3};
 
@@ -145,6 +149,28 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         half: [320.0, 240.0],
         raster: &raster,
     };
+    let coats = CoatBlock {
+        base: rows.vectors(),
+        tint: rows.vectors(),
+        metal: rows.vectors(),
+        metallic: rows.row(),
+        alpha: rows.unit(),
+        eta: rows.row(),
+        mean: rows.vectors(),
+        exists: diffuse,
+        dielectric: metal,
+        transmittance: rows.vectors(),
+        probability: rows.unit(),
+    };
+    let specular = SpecularBlock {
+        color: rows.vectors(),
+        eta: rows.row(),
+        exists: triangles,
+        metal: two_sided & !metal,
+        dielectric: metal,
+    };
+    check_coats(&mut rows, input.arbitrary()?, &surface, &coats, &specular);
+    check_sky(&mut rows, active, flags & 2 == 0);
     for level in Level::detect().and_below() {
         let mut found = SurfaceBlock::EMPTY;
         surfaces.compute(level, &mut found);
@@ -186,4 +212,77 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         check_records("camera ray", 0xffff, &found, &camera.reference());
     }
     Ok(())
+}
+
+/// Samples of the environment at every level against their scalar reference.
+fn check_sky(rows: &mut Rows, active: u32, is_map: bool) {
+    let sky = SkyBlock {
+        at: [rows.unit(), rows.unit()],
+        density: rows.row(),
+        factors: [rows.row(), rows.row()],
+        normal: rows.vectors(),
+    };
+    let [x, y, z] = rows.vectors().map(|[a, b, c, ..]| [a, b, c]);
+    let samples = SkySamples { sky: &sky, to_world: is_map.then_some([x, y, z]), active };
+    let before = (rows.vectors(), rows.row());
+    let (mut direction, mut pdf) = before;
+    let set = samples.reference(&mut direction, &mut pdf);
+    for level in Level::detect().and_below() {
+        let mut found = before;
+        assert_eq!(samples.compute(level, &mut found.0, &mut found.1), set, "{level:?}");
+        check("sky direction", 0xffff, &found.0, &direction);
+        check("sky density", 0xffff, &[found.1], &[pdf]);
+    }
+}
+
+/// Coats and smooth surfaces at every level against their scalar references.
+fn check_coats(
+    rows: &mut Rows,
+    seed: i16,
+    surface: &SurfaceBlock,
+    coats: &CoatBlock,
+    specular: &SpecularBlock,
+) {
+    let mut tables: CoatTables = [[[seed; 16]; 12]; 11];
+    for (i, entry) in tables.as_flattened_mut().as_flattened_mut().iter_mut().enumerate() {
+        *entry = entry.wrapping_mul(i as i16);
+    }
+    let tables = &tables;
+    let (u, lobe, direction) = ([rows.unit(), rows.unit()], rows.unit(), rows.vectors());
+    let light = CoatLight { surface, coats, tables, direction: &direction };
+    let samples = CoatSamples { surface, coats, tables, u: &u, lobe: &lobe };
+    let smooth = SpecularSamples { surface, specular, lobe: &lobe };
+    let before = (rows.vectors(), rows.row(), ScatterBlock::EMPTY);
+    let compute = |level: Option<Level>| {
+        let (mut seen, (mut value, mut pdf, mut out)) = (coats.clone(), before.clone());
+        let sets = match level {
+            None => {
+                seen.see_reference(surface, tables);
+                light.reference(&mut value, &mut pdf);
+                let [exists, delta] = samples.reference(&mut out);
+                [exists, delta, smooth.reference(&mut out)]
+            }
+            Some(level) => {
+                seen.see(level, surface, tables);
+                light.compute(level, &mut value, &mut pdf);
+                let [exists, delta] = samples.compute(level, &mut out);
+                [exists, delta, smooth.compute(level, &mut out)]
+            }
+        };
+        (seen, value, pdf, out, sets)
+    };
+    let wanted = compute(None);
+    for level in Level::detect().and_below() {
+        let found = compute(Some(level));
+        assert_eq!(found.4, wanted.4, "{level:?}");
+        check("transmittance", coats.exists, &found.0.transmittance, &wanted.0.transmittance);
+        check("probability", coats.exists, &[found.0.probability], &[wanted.0.probability]);
+        check("value", 0xffff, &found.1, &wanted.1);
+        check("density", 0xffff, &[found.2], &[wanted.2]);
+        let set = (wanted.4[0] & !specular.exists) | wanted.4[2];
+        check("direction", set, &found.3.direction, &wanted.3.direction);
+        check("weight", set, &found.3.weight, &wanted.3.weight);
+        check("density", set, &[found.3.pdf], &[wanted.3.pdf]);
+        check("index", set, &[found.3.eta], &[wanted.3.eta]);
+    }
 }

@@ -127,6 +127,14 @@ impl Lanes for F8 {
         Self(mask.0.select(self.0, other.0))
     }
     #[inline(always)]
+    fn neighbours(self, table: &[i16]) -> [Self; 2] {
+        let (mut first, mut second) = ([0.0; 8], [0.0; 8]);
+        for (i, lane) in self.to_array().into_iter().enumerate() {
+            [first[i], second[i]] = lane.neighbours(table);
+        }
+        [Self(f32x8::new(first)), Self(f32x8::new(second))]
+    }
+    #[inline(always)]
     fn largest(self) -> f32 {
         let [a, b, c, d, e, f, g, h] = self.0.to_array();
         a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)))
@@ -230,6 +238,11 @@ impl<L: Lanes<Array = [f32; 8]>> Lanes for Pair<L> {
     #[inline(always)]
     fn select(self, mask: Self::Mask, other: Self) -> Self {
         Self(self.0.select(mask.0, other.0), self.1.select(mask.1, other.1))
+    }
+    #[inline(always)]
+    fn neighbours(self, table: &[i16]) -> [Self; 2] {
+        let ([a, b], [c, d]) = (self.0.neighbours(table), self.1.neighbours(table));
+        [Self(a, c), Self(b, d)]
     }
     #[inline(always)]
     fn largest(self) -> f32 {

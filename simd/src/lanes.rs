@@ -58,6 +58,9 @@ pub trait Lanes:
     fn signs(self) -> u32;
     /// `self` in lanes where `mask` is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
+    /// Entries `i` and `i + 1` of `table`; the lanes are integers `i` of at least 0 and below 2^24. Beyond
+    /// the end these are the last two entries; zeros if there are fewer.
+    fn neighbours(self, table: &[i16]) -> [Self; 2];
     /// Largest lane; unspecified with NaN.
     fn largest(self) -> f32;
     /// Smallest lane; unspecified with NaN.
@@ -140,6 +143,13 @@ impl Lanes for f32 {
     #[inline(always)]
     fn select(self, mask: bool, other: Self) -> Self {
         if mask { self } else { other }
+    }
+    #[inline(always)]
+    fn neighbours(self, table: &[i16]) -> [Self; 2] {
+        match table.get((self as usize).min(table.len().saturating_sub(2))..) {
+            Some([first, second, ..]) => [f32::from(*first), f32::from(*second)],
+            _ => [0.0; 2],
+        }
     }
     #[inline(always)]
     fn largest(self) -> f32 {

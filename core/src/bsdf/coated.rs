@@ -14,11 +14,7 @@ use crate::Rgb;
 use crate::sampling::warp::cosine_hemisphere;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
-
-/// Weight of the coat over the base in the choice of the lobe. Light samples find the emitters that the base
-/// reflects, whereas the coat has to find its reflections alone. In a room whose floor mirrors its windows a
-/// weight of 2 lowers the variance of the floor by a seventh, 3.5 by a fifth.
-const COAT_WEIGHT: f32 = 2.0;
+use halflight_simd::kernels::shade::coat::COAT_WEIGHT;
 
 /// Model of a coat.
 pub(super) trait Coat {

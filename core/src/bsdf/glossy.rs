@@ -11,6 +11,8 @@ use super::albedo::{SchlickAlbedo, SchlickFit, schlick_albedo_fit};
 use super::coated::Coat;
 use super::{fresnel, range::unit};
 use crate::Rgb;
+use halflight_simd::kernels::shade::coat::CoatBlock;
+use halflight_simd::kernels::shade::put;
 
 /// Coat over a base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +56,17 @@ impl Glossy {
 
     pub(super) fn coat_transmittance(&self) -> Option<CoatTransmittance> {
         (self.base != Rgb::ZERO).then(|| CoatTransmittance::schlick(self.alpha, self.specular))
+    }
+
+    /// Makes the surface that of vertex `i` of a block.
+    #[inline]
+    pub(crate) fn put(&self, block: &mut CoatBlock, i: usize) {
+        put(&mut block.base, i, self.base.to_array());
+        put(&mut block.tint, i, self.specular.to_array());
+        put(&mut block.metal, i, self.f0.to_array());
+        put(&mut block.mean, i, self.mean_transmittance().to_array());
+        (block.metallic[i & 15], block.alpha[i & 15], block.eta[i & 15]) = (1.0, self.alpha, 1.5);
+        block.exists |= 1 << i;
     }
 
     pub(super) fn is_delta(&self) -> bool {

@@ -25,8 +25,9 @@ mod resolve;
 mod rough_dielectric;
 
 pub use crate::features::{All, DiffuseOnly, DiffuseTextured, Features, Only, Opaque};
+pub(crate) use albedo::COATS;
 pub(crate) use base::CoatTransmittance;
-pub(crate) use coated::CoatView;
+use coated::CoatView;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
@@ -125,12 +126,7 @@ impl Bsdf {
 
     /// [`Bsdf::sample`] with a known [`Bsdf::coat_view`].
     #[inline]
-    pub(crate) fn sample_seen<F: Features>(
-        &self,
-        view: CoatView,
-        wo: Vec3,
-        u: [f32; 3],
-    ) -> Option<BsdfSample> {
+    fn sample_seen<F: Features>(&self, view: CoatView, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
         let wo = above_horizon(wo);
         match self {
             Bsdf::Diffuse(b) => b.sample([u[0], u[1]]),
@@ -157,7 +153,7 @@ impl Bsdf {
 
     /// [`Bsdf::evaluate`] with a known [`Bsdf::coat_view`].
     #[inline]
-    pub(crate) fn evaluate_seen<F: Features>(&self, view: CoatView, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    fn evaluate_seen<F: Features>(&self, view: CoatView, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         let wo = above_horizon(wo);
         match self {
             Bsdf::Diffuse(b) => b.evaluate(wi),
@@ -169,9 +165,9 @@ impl Bsdf {
         }
     }
 
-    /// Part of a coat that depends on the viewer alone, for light samples and a BSDF sample of one vertex.
+    /// Part of a coat that depends on the viewer alone.
     #[inline]
-    pub(crate) fn coat_view<F: Features>(&self, wo: Vec3) -> CoatView {
+    fn coat_view<F: Features>(&self, wo: Vec3) -> CoatView {
         let c = above_horizon(wo).z;
         match self {
             Bsdf::Glossy(b) if F::GLOSSY => CoatView::of(b, c),

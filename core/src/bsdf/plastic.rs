@@ -13,6 +13,8 @@ use super::coated::Coat;
 use super::fresnel;
 use super::range::{MAX_INDEX, unit};
 use crate::Rgb;
+use halflight_simd::kernels::shade::coat::CoatBlock;
+use halflight_simd::kernels::shade::put;
 
 /// Dielectric coat over a diffuse base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +72,18 @@ impl Plastic {
     /// Factor on the coat's Fresnel reflectance; `None` with metal.
     pub(super) fn coat_tint(&self) -> Option<Rgb> {
         (self.metallic == 0.0).then_some(self.coat)
+    }
+
+    /// Makes the surface that of vertex `i` of a block.
+    #[inline]
+    pub(crate) fn put(&self, block: &mut CoatBlock, i: usize) {
+        put(&mut block.base, i, self.base.to_array());
+        put(&mut block.tint, i, self.coat.to_array());
+        put(&mut block.metal, i, self.metal.to_array());
+        put(&mut block.mean, i, self.mean_transmittance().to_array());
+        (block.metallic[i & 15], block.alpha[i & 15], block.eta[i & 15]) =
+            (self.metallic, self.alpha, self.eta);
+        (block.exists, block.dielectric) = (block.exists | 1 << i, block.dielectric | 1 << i);
     }
 
     pub(super) fn is_delta(&self) -> bool {

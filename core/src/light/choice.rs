@@ -4,12 +4,14 @@ use super::area::Emitter;
 use super::environment_visibility::WarpedSample;
 use super::sampler::{LightSample, LightSampler, sample_emitter};
 use super::tree::ChosenBlock;
-use crate::Rgb;
 use crate::sampling::ONE_MINUS_EPSILON;
 use crate::scene::{PointLight, Scene};
+use crate::{Level, Rgb};
 use glam::Vec3;
+use halflight_simd::kernels::shade::direct::LightBlock;
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
-use halflight_simd::kernels::shade::{BLOCK, Row, Row3};
+use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
+use halflight_simd::kernels::shade::{BLOCK, Row, Row3, put};
 
 /// Light that [`LightSampler::choose`] chose, with the probability of the choice.
 #[derive(Clone, Copy)]
@@ -93,6 +95,47 @@ impl<'m> LightSampler<'m> {
         let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
         let (index, probability, _) = self.distant_table.sample(choice)?;
         Some(ChosenLight::Distant { index, probability: probability * shares.distant })
+    }
+
+    /// Puts the environment into a block, sampled at `u` or as `warped` by its visibility, as the light of
+    /// vertex `i` that is chosen with `probability`. False without a sample.
+    #[inline]
+    pub(crate) fn put_environment(
+        &self,
+        block: &mut SkyBlock,
+        i: usize,
+        (normal, u): (Vec3, [f32; 2]),
+        warped: Option<WarpedSample>,
+        probability: f32,
+    ) -> bool {
+        let (u, normal, density) = match warped {
+            Some(WarpedSample { place, density }) => (place, Vec3::ZERO, density),
+            None => (u, normal, 1.0),
+        };
+        put(&mut block.normal, i, normal.to_array());
+        [block.factors[0][i & 15], block.factors[1][i & 15]] = [density, probability];
+        self.environment.is_some_and(|environment| environment.put(block, i, u))
+    }
+
+    /// Samples the environment at the vertices of `active`, into the block of lights. The radiance is still to
+    /// be multiplied by that of the environment. Returns the set of samples.
+    #[inline]
+    pub(crate) fn sample_environments(
+        &self,
+        (scene, level): (&Scene, Level),
+        sky: &SkyBlock,
+        light: &mut LightBlock,
+        active: u32,
+    ) -> u32 {
+        let (Some(sampler), Some(environment)) = (&self.environment, &scene.environment) else { return 0 };
+        let samples = SkySamples { sky, to_world: sampler.map_to_world(environment), active };
+        let exists = samples.compute(level, &mut light.direction, &mut light.pdf);
+        (0..BLOCK).filter(|i| exists >> i & 1 == 1).for_each(|i| put(&mut light.radiance, i, [1.0; 3]));
+        light.exists |= exists;
+        if self.has_visibility() {
+            light.balance |= exists;
+        }
+        exists
     }
 
     /// [`LightSampler::sample_deferred`] of a chosen light.

@@ -7,10 +7,11 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::{
     UNIFORM_SPHERE_PDF, cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere, uniform_sphere_square,
 };
-use crate::sampling::{Distribution2d, sin_cos_turns};
+use crate::sampling::{Cell, Distribution2d, sin_cos_turns};
 use crate::scene::{Environment, Scene, Texture};
 use core::f32::consts::{PI, TAU};
 use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::sky::SkyBlock;
 
 impl Environment {
     /// Radiance from unit `direction`, which points away from the scene.
@@ -180,6 +181,25 @@ impl<'m> EnvironmentSampler<'m> {
         self.map.is_none()
     }
 
+    /// Puts the sample at `u` into a block, as that of vertex `i`. False without a cell.
+    #[inline]
+    pub(super) fn put(&self, block: &mut SkyBlock, i: usize, u: [f32; 2]) -> bool {
+        let mut at = u;
+        if let Some(map) = &self.map {
+            let Some(cell) = map.sample(u) else { return false };
+            at = position(&cell, map.cell_size());
+            block.density[i & 15] = cell.pdf;
+        }
+        [block.at[0][i & 15], block.at[1][i & 15]] = at;
+        true
+    }
+
+    /// Columns of the rotation from the map to the world; `None` without a map.
+    #[inline]
+    pub(super) fn map_to_world(&self, environment: &Environment) -> Option<[[f32; 3]; 3]> {
+        self.map.map(|_| environment.to_map.transpose().to_cols_array_2d())
+    }
+
     /// Direction and density in solid angle.
     #[inline]
     pub(super) fn sample(&self, environment: &Environment, normal: Vec3, u: [f32; 2]) -> Option<(Vec3, f32)> {
@@ -191,9 +211,8 @@ impl<'m> EnvironmentSampler<'m> {
             return Some((Frame::from_normal(normal).to_world(local), cosine_hemisphere_pdf(local.z)));
         };
         let cell = map.sample(u)?;
-        let texel = map.cell_size();
-        let (sin_phi, cos_phi) = sin_cos_turns((cell.x as f32 + cell.offset[0]) * texel[0]);
-        let (sin, cos) = sin_cos_turns(0.5 * (cell.y as f32 + cell.offset[1]) * texel[1]);
+        let [azimuth, polar] = position(&cell, map.cell_size());
+        let ((sin_phi, cos_phi), (sin, cos)) = (sin_cos_turns(azimuth), sin_cos_turns(polar));
         let direction = Vec3::new(sin * cos_phi, cos, sin * sin_phi);
         let pdf = solid_angle_pdf(cell.pdf, sin);
         (pdf > 0.0).then(|| (environment.to_map.transpose() * direction, pdf))
@@ -211,6 +230,13 @@ impl<'m> EnvironmentSampler<'m> {
         let d = environment.to_map * direction;
         solid_angle_pdf(map.pdf_at(square(d).to_array()), libm::sqrtf(d.x * d.x + d.z * d.z))
     }
+}
+
+/// Azimuth and polar angle in turns of a sample of a map whose cells have the edges `texel`.
+#[inline]
+fn position(cell: &Cell, texel: [f32; 2]) -> [f32; 2] {
+    let [u, v] = cell.offset;
+    [(cell.x as f32 + u) * texel[0], 0.5 * (cell.y as f32 + v) * texel[1]]
 }
 
 /// Density over the map's unit square, converted to solid angle: dω = 2π² sin θ du dv.

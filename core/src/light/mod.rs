@@ -11,6 +11,7 @@ mod environment_visibility;
 mod sampler;
 mod tree;
 
+pub(crate) use choice::ChosenLight;
 pub(crate) use emission::LightType;
 pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, EmissionSample, EmissionSampler, GuideStats};
 pub use emitted::emitted;

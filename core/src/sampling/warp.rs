@@ -65,7 +65,7 @@ pub fn uniform_sphere_square(direction: Vec3) -> [f32; 2] {
 }
 
 /// Density of [`uniform_sphere`].
-pub const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
+pub use halflight_simd::kernels::shade::sky::UNIFORM_SPHERE_PDF;
 
 /// Uniform direction of the cone around +z. `one_minus_cos` is 1 − the cosine of its half-angle, which keeps
 /// its precision for narrow cones. Density [`uniform_cone_pdf`].

@@ -146,6 +146,19 @@ impl Lanes for F8 {
         Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
     }
     #[inline(always)]
+    fn neighbours(self, table: &[i16]) -> [Self; 2] {
+        let Some(last) = table.len().checked_sub(2) else { return [self.all(0.0); 2] };
+        // SAFETY: as above; four bytes from an index of at most `last` on are inside the table.
+        unsafe {
+            let last = _mm256_set1_epi32(last.min(1 << 24) as i32);
+            let i = _mm256_max_epi32(_mm256_cvttps_epi32(self.0), _mm256_setzero_si256());
+            let both = _mm256_i32gather_epi32::<2>(table.as_ptr().cast(), _mm256_min_epi32(i, last));
+            let first = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(both));
+            let second = _mm256_srai_epi32::<16>(both);
+            [Self(_mm256_cvtepi32_ps(first)), Self(_mm256_cvtepi32_ps(second))]
+        }
+    }
+    #[inline(always)]
     fn largest(self) -> f32 {
         // SAFETY: as above.
         unsafe {

@@ -3,7 +3,7 @@
 use super::{AMPLITUDES, COSINES, ROUGHNESSES};
 
 /// Albedo where F is 1, minus 1.
-pub(super) static WHITE: [[i16; COSINES]; ROUGHNESSES] = [
+pub(super) const WHITE: [[i16; COSINES]; ROUGHNESSES] = [
     [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
     [-639, -1080, -832, -254, -80, -31, -14, -8, -4, -3, -2, -1, -1, -1, 0, 0],
     [-647, -772, -1088, -1164, -841, -482, -260, -144, -85, -54, -36, -26, -19, -15, -14, -13],
@@ -40,7 +40,7 @@ pub(super) static WHITE: [[i16; COSINES]; ROUGHNESSES] = [
 ];
 
 /// Albedo where F is (1 - c)^5, minus (1 - c)^5.
-pub(super) static EDGE: [[i16; COSINES]; ROUGHNESSES] = [
+pub(super) const EDGE: [[i16; COSINES]; ROUGHNESSES] = [
     [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
     [-2029, -1991, -1185, -410, -158, -70, -32, -13, -4, 0, 1, 1, 1, 0, 0, 0],
     [-4064, -3834, -3268, -2426, -1485, -789, -385, -172, -64, -14, 5, 8, 5, 2, 0, 0],
@@ -56,15 +56,15 @@ pub(super) static EDGE: [[i16; COSINES]; ROUGHNESSES] = [
 ];
 
 /// Mean of `WHITE`.
-pub(super) static WHITE_MEAN: [i16; ROUGHNESSES] =
+pub(super) const WHITE_MEAN: [i16; ROUGHNESSES] =
     [0, -3, -43, -173, -449, -905, -1554, -2376, -3324, -4329, -5319, -6234];
 
 /// Mean of `EDGE`.
-pub(super) static EDGE_MEAN: [i16; ROUGHNESSES] =
+pub(super) const EDGE_MEAN: [i16; ROUGHNESSES] =
     [0, -4, -35, -100, -182, -261, -326, -374, -408, -431, -446, -456];
 
 /// From outside, minus that of the smooth coat.
-pub(super) static TRANSMITTANCE: [[[i16; COSINES]; ROUGHNESSES]; AMPLITUDES] = [
+pub(super) const TRANSMITTANCE: [[[i16; COSINES]; ROUGHNESSES]; AMPLITUDES] = [
     [
         [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
         [-9998, -3572, -489, -104, -33, -14, -6, -3, -2, -1, -1, 0, 0, 0, 0, 0],
@@ -266,7 +266,7 @@ pub(super) static TRANSMITTANCE: [[[i16; COSINES]; ROUGHNESSES]; AMPLITUDES] = [
 ];
 
 /// From inside, minus that of the smooth coat.
-pub(super) static INTERNAL: [[i16; ROUGHNESSES]; AMPLITUDES] = [
+pub(super) const INTERNAL: [[i16; ROUGHNESSES]; AMPLITUDES] = [
     [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
     [-66, -81, -140, -312, -636, -1090, -1602, -2093, -2511, -2838, -3081, -3255],
     [-101, -102, -156, -321, -652, -1160, -1809, -2525, -3228, -3858, -4384, -4802],

@@ -189,7 +189,7 @@ fn the_tables_hold_the_integrals() {
 fn print_the_tables() {
     let t = Tables::derive();
     let print = |name: &str, meaning: &str, shape: &str, numbers: String| {
-        println!("\n/// {meaning}\npub(super) static {name}: {shape} = {numbers};");
+        println!("\n/// {meaning}\npub(super) const {name}: {shape} = {numbers};");
     };
     println!("//! Made by `print_the_tables` in `derive.rs`; see the module above for axes and unit.");
     println!("\nuse super::{{AMPLITUDES, COSINES, ROUGHNESSES}};");

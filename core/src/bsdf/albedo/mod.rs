@@ -14,17 +14,22 @@ pub(in crate::bsdf) use fit::{schlick_albedo as schlick_albedo_fit, transmittanc
 
 use super::range::unit;
 use super::{fresnel, sqrt};
+use halflight_simd::kernels::shade::coat_tables::{
+    AMPLITUDES, COSINES, CoatTables, LAST_AMPLITUDE, ROUGHNESSES, STEP,
+};
 
-/// Unit of the tables.
-const STEP: f32 = 1e-4;
-/// Number of nodes over sqrt(cos θ), 0 … 1.
-const COSINES: usize = 16;
-/// Number of nodes over sqrt(alpha), 0 … 1.
-const ROUGHNESSES: usize = 12;
-/// Number of nodes over r, 0 … [`LAST_AMPLITUDE`].
-const AMPLITUDES: usize = 9;
-/// Largest r, at η = 9. Coats beyond use its difference.
-const LAST_AMPLITUDE: f32 = 0.8;
+/// The tables that lanes read too.
+pub(crate) static COATS: CoatTables = {
+    let mut tables = [[[0; COSINES]; ROUGHNESSES]; AMPLITUDES + 2];
+    let mut k = 0;
+    while k < AMPLITUDES {
+        tables[k] = data::TRANSMITTANCE[k];
+        k += 1;
+    }
+    tables[AMPLITUDES] = data::WHITE;
+    tables[AMPLITUDES + 1] = data::EDGE;
+    tables
+};
 
 /// Position on an axis of a table: the node below, and the fraction of the distance to the next node.
 type Place = (usize, f32);
@@ -84,8 +89,8 @@ impl SchlickAlbedo {
         }
         let at = (roughness(alpha), place(sqrt(c), COSINES));
         Self {
-            white: unit(1.0 + STEP * across(&data::WHITE, at.0, at.1)),
-            edge: unit(smooth + STEP * across(&data::EDGE, at.0, at.1)),
+            white: unit(1.0 + STEP * across(&COATS[AMPLITUDES], at.0, at.1)),
+            edge: unit(smooth + STEP * across(&COATS[AMPLITUDES + 1], at.0, at.1)),
         }
     }
 
@@ -121,7 +126,7 @@ pub(super) fn transmittance(c: f32, alpha: f32, eta: f32) -> f32 {
     }
     let (k, t) = amplitude(eta);
     let at = (roughness(alpha), place(sqrt(c), COSINES));
-    let table = |k: usize| data::TRANSMITTANCE.get(k).map_or(0.0, |table| across(table, at.0, at.1));
+    let table = |k: usize| COATS.get(k).map_or(0.0, |table| across(table, at.0, at.1));
     unit(smooth + STEP * lerp(table(k), table(k + 1), t))
 }
 

@@ -1,17 +1,21 @@
 //! Block of sixteen vertices in structures of arrays: inputs and results of the shading kernels.
 
 use crate::Rgb;
-use crate::bsdf::{Bsdf, CoatView, Diffuse};
+use crate::bsdf::{Bsdf, Diffuse, Features};
 use crate::geometry::Frame;
 use crate::light::LightSample;
 use crate::scene::{Material, SurfacePoint};
+use crate::transport::walk::termination::TRAPPED_FROM;
 use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
+use halflight_simd::kernels::shade::coat::CoatBlock;
 use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
 use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
 use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
+use halflight_simd::kernels::shade::sky::SkyBlock;
+use halflight_simd::kernels::shade::specular::SpecularBlock;
 use halflight_simd::kernels::shade::surface::SurfaceBlock;
 use halflight_simd::kernels::shade::{Row, Row3, at, put};
 
@@ -23,10 +27,15 @@ pub(super) struct Block<'a> {
     pub(super) weights: [Row; 2],
     pub(super) surface: SurfaceBlock,
     pub(super) bsdf: BsdfBlock,
+    pub(super) coats: CoatBlock,
+    pub(super) specular: SpecularBlock,
+    /// Set of coats without a base and without a rough lobe.
+    pub(super) smooth_coats: u32,
     pub(super) samples: SampleBlock,
     pub(super) numbers: VertexNumbers,
     pub(super) emitters: EmitterBlock,
     pub(super) probability: Row,
+    pub(super) sky: SkyBlock,
     pub(super) light: LightBlock,
     pub(super) value: Row3,
     pub(super) pdf: Row,
@@ -48,10 +57,8 @@ pub(super) struct Block<'a> {
     pub(super) triangle: [u32; BLOCK],
     pub(super) material: [&'a Material; BLOCK],
     pub(super) uv: [Vec2; BLOCK],
-    /// BSDFs that lanes do not evaluate.
+    /// BSDFs that lanes do not sample, and coats.
     pub(super) others: [Bsdf; BLOCK],
-    /// Their coats for the viewers.
-    pub(super) coats: [CoatView; BLOCK],
     /// First triangles of the sampled area lights.
     pub(super) lamp: [u32; BLOCK],
     /// True if the only light is in `emitters`, at every vertex.
@@ -109,10 +116,14 @@ impl<'a> Block<'a> {
             weights: [[0.0; BLOCK]; 2],
             surface: SurfaceBlock::EMPTY,
             bsdf: BsdfBlock::EMPTY,
+            coats: CoatBlock::EMPTY,
+            specular: SpecularBlock::EMPTY,
+            smooth_coats: 0,
             samples: SampleBlock::EMPTY,
             numbers: VertexNumbers::EMPTY,
             emitters: EmitterBlock::EMPTY,
             probability: [0.0; BLOCK],
+            sky: SkyBlock::EMPTY,
             light: LightBlock::EMPTY,
             value: [[0.0; BLOCK]; 3],
             pdf: [0.0; BLOCK],
@@ -132,10 +143,72 @@ impl<'a> Block<'a> {
             material: [&GREY; BLOCK],
             uv: [Vec2::ZERO; BLOCK],
             others: [Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }); BLOCK],
-            coats: [CoatView::default(); BLOCK],
             lamp: [0; BLOCK],
             is_lone: false,
         }
+    }
+
+    /// Set of the vertices whose BSDFs lanes sample.
+    #[inline]
+    pub(super) fn in_lanes(&self) -> u32 {
+        self.bsdf.diffuse | self.bsdf.metal | self.coats.exists | self.specular.exists
+    }
+
+    /// Makes `bsdf` that of vertex `i`, which ends segment `segments` of its path.
+    #[inline]
+    pub(super) fn put_bsdf<F: Features>(&mut self, i: usize, bsdf: &Bsdf, segments: u32) {
+        let one = 1 << i;
+        let (color, eta) = match bsdf {
+            Bsdf::Diffuse(b) => {
+                put(&mut self.bsdf.reflectance, i, b.reflectance.to_array());
+                self.bsdf.diffuse |= one;
+                return;
+            }
+            Bsdf::Conductor(b) if F::GLOSSY && b.alpha > 0.0 => {
+                put(&mut self.bsdf.reflectance, i, b.f0.to_array());
+                self.bsdf.alpha[i] = b.alpha;
+                self.bsdf.metal |= one;
+                return;
+            }
+            Bsdf::Plastic(b) if F::GLOSSY => {
+                b.put(&mut self.coats, i);
+                self.smooth_coats |= u32::from(bsdf.is_delta()) << i;
+                self.others[i] = *bsdf;
+                return;
+            }
+            Bsdf::Glossy(b) if F::GLOSSY => {
+                b.put(&mut self.coats, i);
+                self.smooth_coats |= u32::from(bsdf.is_delta()) << i;
+                self.others[i] = *bsdf;
+                return;
+            }
+            Bsdf::Mirror(b) if F::GLOSSY => (b.reflectance, 1.0),
+            Bsdf::Conductor(b) if F::GLOSSY => {
+                self.specular.metal |= one;
+                (b.f0, 1.0)
+            }
+            // Paths that may be trapped by total reflection are counted one by one.
+            Bsdf::Dielectric(b) if F::DIELECTRIC && segments < TRAPPED_FROM => {
+                self.specular.dielectric |= one;
+                (b.tint, b.eta)
+            }
+            _ => {
+                self.others[i] = *bsdf;
+                return;
+            }
+        };
+        put(&mut self.specular.color, i, color.to_array());
+        self.specular.eta[i] = eta;
+        self.specular.exists |= one;
+    }
+
+    /// Removes the BSDFs of all vertices.
+    #[inline]
+    pub(super) fn clear_bsdfs(&mut self) {
+        (self.bsdf.diffuse, self.bsdf.metal) = (0, 0);
+        (self.coats.exists, self.coats.dielectric, self.smooth_coats) = (0, 0, 0);
+        let SpecularBlock { exists, metal, dielectric, .. } = &mut self.specular;
+        (*exists, *metal, *dielectric) = (0, 0, 0);
     }
 
     /// Stores a surface point computed without lanes.
@@ -175,14 +248,8 @@ impl<'a> Block<'a> {
     }
 }
 
-/// Stores a light sample of the vertex `i` at `position`; `balance`: weighted by the balance heuristic.
-pub(super) fn put_light(
-    light: &mut LightBlock,
-    i: usize,
-    sample: &LightSample,
-    position: Vec3,
-    balance: bool,
-) {
+/// Stores a light sample of the vertex `i` at `position`.
+pub(super) fn put_light(light: &mut LightBlock, i: usize, sample: &LightSample, position: Vec3) {
     let LightSample { direction, distance, target, radiance, pdf, delta, .. } = *sample;
     put(&mut light.direction, i, direction.to_array());
     put(&mut light.radiance, i, radiance.to_array());
@@ -198,5 +265,77 @@ pub(super) fn put_light(
     light.bounded |= u32::from(end.is_some()) << i;
     light.area |= u32::from(target.is_some()) << i;
     light.alone |= u32::from(delta) << i;
-    light.balance |= u32::from(balance) << i;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Level;
+    use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic};
+    use crate::sampling::Random;
+    use crate::sampling::warp::uniform_sphere;
+    use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
+    use halflight_simd::kernels::shade::specular::SpecularSamples;
+
+    /// Coats and smooth surfaces of all kinds.
+    fn surfaces(random: &Random, i: u32) -> Bsdf {
+        let [r, g, b, alpha, metallic, eta] = [0, 1, 2, 3, 4, 5].map(|k| random.single(20 * i + k));
+        let (color, coat) = (Rgb::new(r, g, b), Rgb::new(b, r, g));
+        let alpha = if i % 3 == 0 { 0.0 } else { alpha.max(1e-3) };
+        let base = if i % 7 == 0 { Rgb::ZERO } else { color };
+        match i % 5 {
+            0 => Bsdf::Glossy(Glossy::new(base, coat, alpha, metallic)),
+            1 => Bsdf::Mirror(Mirror { reflectance: color }),
+            2 => Bsdf::Conductor(Conductor { f0: color, alpha: 0.0 }),
+            3 => Bsdf::Dielectric(Dielectric { eta: 0.4 + 2.0 * eta, tint: color }),
+            _ => Bsdf::Plastic(Plastic::new(base, coat * 0.05, alpha, (metallic - 0.5).max(0.0), 1.0 + eta)),
+        }
+    }
+
+    #[test]
+    fn lanes_have_the_bits_of_single_bsdfs() {
+        let random = Random::new(5, 0);
+        let (mut block, level) = (Block::new(), Level::detect());
+        for round in 0..200 {
+            block.clear_bsdfs();
+            block.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                .map(|axis| axis.map(|coordinate| [coordinate; BLOCK]));
+            let (mut lobe, mut all) = ([0.0; BLOCK], [Bsdf::Mirror(Mirror { reflectance: Rgb::ONE }); BLOCK]);
+            for i in 0..BLOCK {
+                let n = 16 * round + i as u32;
+                let number = |k: u32| random.single(20 * n + k);
+                let wo = uniform_sphere([number(6), number(7)]);
+                put(&mut block.surface.wo, i, [wo.x, wo.y, if n % 9 == 0 { 0.0 } else { wo.z.abs() }]);
+                put(&mut block.light.direction, i, uniform_sphere([number(8), number(9)]).to_array());
+                (block.numbers.scatter[0][i], block.numbers.scatter[1][i]) = (number(10), number(11));
+                (lobe[i], all[i]) = (number(12), surfaces(&random, n));
+                block.put_bsdf::<All>(i, &all[i], 1);
+            }
+            block.coats.see(level, &block.surface, &COATS);
+            let Block { surface, coats, specular, light, numbers, value, pdf, given, .. } = &mut block;
+            CoatLight { surface, coats, tables: &COATS, direction: &light.direction }
+                .compute(level, value, pdf);
+            let u = &numbers.scatter;
+            let sampled =
+                CoatSamples { surface, coats, tables: &COATS, u, lobe: &lobe }.compute(level, given);
+            let smooth = SpecularSamples { surface, specular, lobe: &lobe }.compute(level, given);
+            for (i, bsdf) in all.iter().enumerate() {
+                let bit = |set: u32| set >> i & 1 == 1;
+                let wo = Vec3::from(at(&surface.wo, i));
+                let (f, density) = bsdf.evaluate::<All>(wo, at(&light.direction, i).into());
+                if bit(coats.exists) {
+                    assert_eq!((Rgb::from(at(value, i)), pdf[i]), (f, density), "{bsdf:?}");
+                }
+                let sample = bsdf.sample::<All>(wo, [u[0][i], u[1][i], lobe[i]]);
+                let is_sampled = bit(sampled[0] & coats.exists | smooth);
+                assert_eq!(is_sampled, sample.is_some(), "{bsdf:?}");
+                let Some(sample) = sample else { continue };
+                assert_eq!(bit(sampled[1] | specular.exists), sample.delta, "{bsdf:?}");
+                let found = (at(&given.direction, i), at(&given.weight, i), given.eta[i]);
+                let wanted = (sample.direction.to_array(), sample.weight.to_array(), sample.eta);
+                assert_eq!(found, wanted, "{bsdf:?}");
+                assert_eq!(given.pdf[i], if sample.delta { f32::INFINITY } else { sample.pdf }, "{bsdf:?}");
+            }
+        }
+    }
 }

@@ -13,7 +13,7 @@ pub(in crate::transport) const MAX_VERTICES: u32 = 1 << 13;
 /// Number of vertices after which total reflection also ends a path. In theory light inside glass for so long
 /// never leaves it; in practice one ray in 10⁴ escapes by rounding at an edge, over thousands of reflections
 /// much of the light. A light guide has a hundred reflections.
-const TRAPPED_FROM: u32 = 256;
+pub(in crate::transport) const TRAPPED_FROM: u32 = 256;
 
 /// True if a path is cut, and so unfinished, at the vertex that ends segment `segments` and that it leaves by
 /// `sample` of `bsdf`.

@@ -1,6 +1,7 @@
 //! BSDFs at the vertices of a block, over lanes.
 
-use super::ggx::{Ggx, schlick};
+use super::fresnel::schlick;
+use super::ggx::Ggx;
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, scale};
 use super::{Row, Row3, at, load3};
@@ -52,8 +53,7 @@ impl<L: Lanes> VertexLanes<L> {
     /// Direction to the viewer, raised above the horizon.
     #[inline(always)]
     pub(super) fn viewer(&self) -> [L; 3] {
-        let [x, y, z] = self.wo;
-        [x, y, z.max(z.all(RESOLUTION))]
+        viewer(self.wo)
     }
 
     /// True where both normals have the direction on the same side.
@@ -61,6 +61,12 @@ impl<L: Lanes> VertexLanes<L> {
     pub(super) fn sides_agree(&self, local_z: L, world: [L; 3]) -> L::Mask {
         local_z.all(0.0).lt(local_z * dot(world, self.geometric_normal))
     }
+}
+
+/// Local direction to a viewer, raised above the horizon.
+#[inline(always)]
+pub(super) fn viewer<L: Lanes>([x, y, z]: [L; 3]) -> [L; 3] {
+    [x, y, z.max(z.all(RESOLUTION))]
 }
 
 /// f |cos| and density of a rough metal.

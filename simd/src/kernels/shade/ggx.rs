@@ -77,12 +77,3 @@ impl<L: Lanes> Ggx<L> {
         masking * (self.cap_bound(wo) * wo[2] + stretch) / (wo[2] + stretch)
     }
 }
-
-/// Schlick 1994, eq. 24: `f0` at normal incidence, white at grazing incidence.
-#[inline(always)]
-pub fn schlick<L: Lanes>(f0: [L; 3], c: L) -> [L; 3] {
-    let (zero, one) = (c.all(0.0), c.all(1.0));
-    let m = (one - c).max(zero).min(one);
-    let m2 = m * m;
-    add(f0, scale(sub([one; 3], f0), m2 * m2 * m))
-}

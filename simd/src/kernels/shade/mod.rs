@@ -6,12 +6,17 @@
 
 pub mod bsdf;
 pub mod camera;
+pub mod coat;
+pub mod coat_tables;
 pub mod direct;
 pub mod emitter;
+mod fresnel;
 pub mod ggx;
 pub mod numbers;
 pub mod rectangle;
 pub mod scatter;
+pub mod sky;
+pub mod specular;
 pub mod surface;
 pub mod triangle;
 pub mod vector;

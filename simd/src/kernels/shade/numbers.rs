@@ -223,6 +223,11 @@ impl SampleBlock {
         level.dispatch(Pairs::<false>(self, dimension))
     }
 
+    /// Numbers of the vertices at `offset` from their first dimensions.
+    pub fn singles(&self, level: Level, offset: u32) -> Row {
+        level.dispatch(Singles(self, offset))
+    }
+
     /// Second pairs of quads of numbers at one dimension.
     pub fn second_pairs(&self, level: Level, dimension: u32) -> [Row; 2] {
         level.dispatch(Pairs::<true>(self, dimension))
@@ -277,6 +282,23 @@ impl Kernel for Lights<'_> {
     }
 }
 
+struct Singles<'k>(&'k SampleBlock, u32);
+
+impl Kernel for Singles<'_> {
+    type Out = Row;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Row {
+        let Self(samples, offset) = self;
+        let mut out = [0.0; BLOCK];
+        for (i, out) in out.iter_mut().enumerate() {
+            let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());
+            *out = single(key, index, samples.dimension[i].wrapping_add(offset));
+        }
+        out
+    }
+}
+
 struct Pairs<'k, const SECOND: bool>(&'k SampleBlock, u32);
 
 impl<const SECOND: bool> Kernel for Pairs<'_, SECOND> {
@@ -322,6 +344,7 @@ mod tests {
                 samples.vertices(level, offsets, false, &mut plain);
                 assert_eq!(found, wanted, "{level:?}");
                 assert_eq!((plain.light, plain.choice), (wanted.light, [0.0; BLOCK]), "{level:?}");
+                assert_eq!(samples.singles(level, offsets.roulette), wanted.roulette, "{level:?}");
                 let (first, second) = (samples.pairs(level, 3), samples.second_pairs(level, 3));
                 for i in 0..BLOCK {
                     let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());

@@ -3,7 +3,8 @@
 //! Samples of BSDFs without lanes come from the caller.
 
 use super::bsdf::{BsdfBlock, VertexLanes, lane, vertices};
-use super::ggx::{Ggx, schlick};
+use super::fresnel::schlick;
+use super::ggx::Ggx;
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, divide, mul, scale};
 use super::{Row, Row3, at, load3, put, warp};

@@ -2,10 +2,14 @@
 
 use super::bsdf::BsdfBlock;
 use super::camera::CameraRays;
+use super::coat::{CoatBlock, CoatLight, CoatSamples};
+use super::coat_tables::CoatTables;
 use super::direct::{Direct, LightBlock, ShadowBlock};
 use super::emitter::{EmitterBlock, EmitterSamples};
 use super::numbers::{mix, unit_float};
 use super::scatter::{NextBlock, Scatter, ScatterBlock};
+use super::sky::{SkyBlock, SkySamples};
+use super::specular::{SpecularBlock, SpecularSamples};
 use super::surface::{SurfaceBlock, Surfaces};
 use super::{Row, Row3, at, put};
 use crate::Level;
@@ -153,15 +157,7 @@ fn scattering_agrees_with_the_reference_on_every_level() {
     let mut random = Random(3);
     let (mut shadows, mut rays) = (0, 0);
     for _ in 0..400 {
-        let corners = [random.vectors(), random.vectors(), random.vectors()];
-        let weights = [random.row(0.0, 0.5), random.row(0.0, 0.5)];
-        let directions = random.directions();
-        let views = core::array::from_fn(|i| {
-            let [x, y, z] = at(&directions, i);
-            [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
-        });
-        let surface =
-            Surfaces { corners: &corners, normals: None, weights: &weights, rays: &views }.reference();
+        let surface = seen(&mut random);
         let diffuse = random.bits();
         let metal = random.bits() & !diffuse;
         let reflectance = [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)];
@@ -188,12 +184,7 @@ fn scattering_agrees_with_the_reference_on_every_level() {
             each: &each,
             throughput: &throughput,
         };
-        let given = ScatterBlock {
-            direction: random.directions(),
-            weight: random.vectors(),
-            pdf: random.row(0.0, 1.0),
-            eta: random.row(0.7, 1.5),
-        };
+        let given = given(&mut random);
         let u = [random.row(0.0, 1.0), random.row(0.0, 1.0)];
         let (roulette, most, eta_squared) =
             (random.row(0.0, 1.0), random.row(0.9, 1.0), random.row(0.5, 2.0));
@@ -234,6 +225,174 @@ fn scattering_agrees_with_the_reference_on_every_level() {
         }
     }
     assert!(shadows > 500 && rays > 500, "{shadows} shadow rays, {rays} rays");
+}
+
+/// Seen surfaces without normals.
+fn seen(random: &mut Random) -> SurfaceBlock {
+    let corners = [random.vectors(), random.vectors(), random.vectors()];
+    let weights = [random.row(0.0, 0.5), random.row(0.0, 0.5)];
+    let directions = random.directions();
+    let views = core::array::from_fn(|i| {
+        let [x, y, z] = at(&directions, i);
+        [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
+    });
+    Surfaces { corners: &corners, normals: None, weights: &weights, rays: &views }.reference()
+}
+
+/// Coats of both kinds, rough and smooth, of which a part has no base.
+fn coats(random: &mut Random) -> CoatBlock {
+    let exists = random.bits();
+    let mut coats = CoatBlock {
+        base: [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)],
+        tint: [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)],
+        metal: [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)],
+        metallic: random.row(0.0, 1.0),
+        alpha: random.row(-0.3, 1.0).map(|alpha| if alpha < 1e-4 { 0.0 } else { alpha }),
+        eta: random.row(1.0, 12.0),
+        mean: [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)],
+        exists,
+        dielectric: exists & random.bits(),
+        ..CoatBlock::EMPTY
+    };
+    (coats.eta[2], coats.alpha[5]) = (1.0, 1.0);
+    put(&mut coats.base, 7, [0.0; 3]);
+    coats
+}
+
+/// Samples before a kernel writes its own.
+fn given(random: &mut Random) -> ScatterBlock {
+    ScatterBlock {
+        direction: random.directions(),
+        weight: random.vectors(),
+        pdf: random.row(0.0, 1.0),
+        eta: random.row(0.7, 1.5),
+    }
+}
+
+/// Asserts that samples agree in the lanes of `set`, and that those beyond `written` are `before`.
+fn check_samples(
+    found: &ScatterBlock,
+    wanted: &ScatterBlock,
+    before: &ScatterBlock,
+    [set, written]: [u32; 2],
+) {
+    let all = |block: &ScatterBlock, i: usize| {
+        let vectors = [bits3(&block.direction, i), bits3(&block.weight, i)];
+        (vectors, block.pdf[i].to_bits(), block.eta[i].to_bits())
+    };
+    lanes(set).for_each(|i| assert_eq!(all(found, i), all(wanted, i), "{i}"));
+    lanes(!written & 0xffff).for_each(|i| assert_eq!(all(found, i), all(before, i), "{i}"));
+}
+
+#[test]
+fn coats_agree_with_the_reference_on_every_level() {
+    let mut random = Random(5);
+    let mut tables: CoatTables = [[[0; 16]; 12]; 11];
+    for value in tables.as_flattened_mut().as_flattened_mut() {
+        *value = (random.next() * 4000.0) as i16 - 2000;
+    }
+    let mut counts = [0; 3];
+    for _ in 0..400 {
+        let surface = seen(&mut random);
+        let mut coats = coats(&mut random);
+        let dark = coats.clone();
+        coats.see_reference(&surface, &tables);
+        let direction = random.directions();
+        let (value, pdf, before) = (random.vectors(), random.row(0.0, 1.0), given(&mut random));
+        let light = CoatLight { surface: &surface, coats: &coats, tables: &tables, direction: &direction };
+        let u = [random.row(0.0, 1.0), random.row(0.0, 1.0)];
+        let lobe = random.row(0.0, 1.0);
+        let samples = CoatSamples { surface: &surface, coats: &coats, tables: &tables, u: &u, lobe: &lobe };
+        let (mut lit, mut wanted) = ((value, pdf), before.clone());
+        light.reference(&mut lit.0, &mut lit.1);
+        let sets = samples.reference(&mut wanted);
+        let set = coats.exists & surface.regular;
+        counts[0] += lanes(set).filter(|&i| lit.1[i] > 0.0).count();
+        counts[1] += (sets[0] & set).count_ones() as usize;
+        counts[2] += (sets[1] & set).count_ones() as usize;
+        for level in Level::detect().and_below() {
+            let mut found = dark.clone();
+            found.see(level, &surface, &tables);
+            for i in lanes(set) {
+                let all =
+                    |coats: &CoatBlock| (bits3(&coats.transmittance, i), coats.probability[i].to_bits());
+                assert_eq!(all(&found), all(&coats), "{level:?} {i}");
+            }
+            let mut found = (value, pdf);
+            light.compute(level, &mut found.0, &mut found.1);
+            for i in lanes(set | !coats.exists & 0xffff) {
+                let all = |of: &(Row3, Row)| (bits3(&of.0, i), of.1[i].to_bits());
+                assert_eq!(all(&found), all(&lit), "{level:?} {i}");
+            }
+            let mut found = before.clone();
+            let found_sets = samples.compute(level, &mut found);
+            assert_eq!(found_sets.map(|bits| bits & set), sets.map(|bits| bits & set), "{level:?}");
+            check_samples(&found, &wanted, &before, [sets[0] & set, coats.exists]);
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 200), "{counts:?}");
+}
+
+#[test]
+fn smooth_surfaces_agree_with_the_reference_on_every_level() {
+    let mut random = Random(6);
+    let mut counts = [0; 3];
+    for _ in 0..400 {
+        let (surface, before) = (seen(&mut random), given(&mut random));
+        let (exists, dielectric) = (random.bits(), random.bits());
+        let metal = random.bits() & !dielectric;
+        let color = [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)];
+        let mut specular = SpecularBlock { color, eta: random.row(0.4, 2.0), exists, metal, dielectric };
+        specular.eta[3] = 1.0;
+        put(&mut specular.color, 9, [0.0; 3]);
+        let lobe = random.row(0.0, 1.0);
+        let samples = SpecularSamples { surface: &surface, specular: &specular, lobe: &lobe };
+        let mut wanted = before.clone();
+        let set = samples.reference(&mut wanted) & surface.regular;
+        counts[0] += (set & !dielectric).count_ones();
+        let refracted = lanes(set & dielectric).filter(|&i| wanted.direction[2][i] < 0.0).count() as u32;
+        counts[1] += refracted;
+        counts[2] += (set & dielectric).count_ones() - refracted;
+        for level in Level::detect().and_below() {
+            let mut found = before.clone();
+            assert_eq!(samples.compute(level, &mut found) & surface.regular, set, "{level:?}");
+            check_samples(&found, &wanted, &before, [set, exists]);
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 200), "{counts:?}");
+}
+
+#[test]
+fn environment_samples_agree_with_the_reference_on_every_level() {
+    let mut random = Random(7);
+    let mut counts = [0; 2];
+    for round in 0..400 {
+        let mut sky = SkyBlock {
+            at: [random.row(0.0, 1.0), random.row(0.0, 0.5)],
+            density: random.row(0.0, 4.0),
+            factors: [random.row(0.5, 2.0), random.row(0.1, 1.0)],
+            normal: random.directions(),
+        };
+        // The pole of the map, a black cell, and all directions.
+        (sky.at[1][1], sky.density[2]) = (0.0, 0.0);
+        put(&mut sky.normal, 5, [0.0; 3]);
+        let turned = at(&random.directions(), 0);
+        let to_world = (round % 2 == 0).then_some([turned, [0.0, 1.0, 0.0], [-0.0, 0.6, 0.8]]);
+        let samples = SkySamples { sky: &sky, to_world, active: random.bits() };
+        let before = (random.vectors(), random.row(0.0, 1.0));
+        let mut wanted = before;
+        let set = samples.reference(&mut wanted.0, &mut wanted.1);
+        counts[round % 2] += set.count_ones();
+        for level in Level::detect().and_below() {
+            let mut found = before;
+            assert_eq!(samples.compute(level, &mut found.0, &mut found.1), set, "{level:?}");
+            let bits = |(direction, pdf): &(Row3, Row)| {
+                (direction.map(|r| r.map(f32::to_bits)), pdf.map(f32::to_bits))
+            };
+            assert_eq!(bits(&found), bits(&wanted), "{level:?}");
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 1000), "{counts:?}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ macro_rules! lanes {
     ($lanes:ident, $mask:ident, $bits:ty, $n:literal, $register:ty,
      $add:ident $sub:ident $mul:ident $div:ident $xor:ident $and_not:ident $splat:ident
      $min:ident $max:ident $compare:ident $blend:ident $store:ident $largest:ident $smallest:ident
-     $signs:ident $bits_of:ident $sqrt:ident $and:ident $or:ident $fused:ident) => {
+     $signs:ident $bits_of:ident $sqrt:ident $and:ident $or:ident $fused:ident $neighbours:ident) => {
         /// Lanes of a register.
         #[derive(Clone, Copy)]
         pub(crate) struct $lanes(pub(super) $register);
@@ -137,6 +137,12 @@ macro_rules! lanes {
                 Self(unsafe { $blend(mask.0, other.0, self.0) })
             }
             #[inline(always)]
+            fn neighbours(self, table: &[i16]) -> [Self; 2] {
+                let Some(last) = table.len().checked_sub(2) else { return [self.all(0.0); 2] };
+                // SAFETY: as above; four bytes from `last` on are inside the table.
+                unsafe { $neighbours(self.0, table.as_ptr(), last.min(1 << 24) as i32).map(Self) }
+            }
+            #[inline(always)]
             fn largest(self) -> f32 {
                 // SAFETY: as above.
                 unsafe { $largest(self.0) }
@@ -191,13 +197,45 @@ unsafe fn smallest8(lanes: __m256) -> f32 {
     }
 }
 
+/// Entries at `indices` and behind them, at most at `last`.
+///
+/// # Safety
+/// The processor has AVX2, and two entries from `last` on can be read.
+#[inline(always)]
+unsafe fn neighbours8(indices: __m256, table: *const i16, last: i32) -> [__m256; 2] {
+    // SAFETY: the caller's.
+    unsafe {
+        let i = _mm256_max_epi32(_mm256_cvttps_epi32(indices), _mm256_setzero_si256());
+        let i = _mm256_min_epi32(i, _mm256_set1_epi32(last));
+        let both = _mm256_i32gather_epi32::<2>(table.cast(), i);
+        let first = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(both));
+        [_mm256_cvtepi32_ps(first), _mm256_cvtepi32_ps(_mm256_srai_epi32::<16>(both))]
+    }
+}
+
+/// [`neighbours8`] of sixteen indices.
+///
+/// # Safety
+/// The processor has AVX-512, and two entries from `last` on can be read.
+#[inline(always)]
+unsafe fn neighbours16(indices: __m512, table: *const i16, last: i32) -> [__m512; 2] {
+    // SAFETY: the caller's.
+    unsafe {
+        let i = _mm512_max_epi32(_mm512_cvttps_epi32(indices), _mm512_setzero_si512());
+        let i = _mm512_min_epi32(i, _mm512_set1_epi32(last));
+        let both = _mm512_i32gather_epi32::<2>(i, table.cast());
+        let first = _mm512_srai_epi32::<16>(_mm512_slli_epi32::<16>(both));
+        [_mm512_cvtepi32_ps(first), _mm512_cvtepi32_ps(_mm512_srai_epi32::<16>(both))]
+    }
+}
+
 lanes!(F8, M8, __mmask8, 8, __m256,
     _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_xor_ps _mm256_andnot_ps _mm256_set1_ps
     _mm256_min_ps _mm256_max_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps _mm256_storeu_ps largest8 smallest8
     _mm256_movepi32_mask _mm256_castps_si256 _mm256_sqrt_ps _mm256_and_ps _mm256_or_ps
-    _mm256_fmsub_ps);
+    _mm256_fmsub_ps neighbours8);
 lanes!(F16, M16, __mmask16, 16, __m512,
     _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_xor_ps _mm512_andnot_ps _mm512_set1_ps
     _mm512_min_ps _mm512_max_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_storeu_ps _mm512_reduce_max_ps
     _mm512_reduce_min_ps _mm512_movepi32_mask _mm512_castps_si512 _mm512_sqrt_ps _mm512_and_ps _mm512_or_ps
-    _mm512_fmsub_ps);
+    _mm512_fmsub_ps neighbours16);

@@ -5,10 +5,14 @@ use halflight_core::Level;
 use halflight_core::sampling::{mix, unit_float};
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
+use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers, pair, place_key, single};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
+use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
+use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::{Row, Row3, at};
 
@@ -26,14 +30,26 @@ pub(super) const KERNELS: &[Kernel] = &[
     Kernel { name: "numbers of a vertex", run: |blocks, i, level| blocks.0[i].numbers(level) },
     Kernel { name: "numbers of a light sample", run: |blocks, i, level| blocks.0[i].light_numbers(level) },
     Kernel { name: "near rectangle lights", run: |blocks, i, level| blocks.0[i].light(level) },
+    Kernel { name: "samples of a sky map", run: |blocks, i, level| blocks.0[i].sky(level) },
     Kernel { name: "light on diffuse", run: |blocks, i, level| blocks.0[i].direct(DIFFUSE, level) },
     Kernel { name: "light on rough metal", run: |blocks, i, level| blocks.0[i].direct(METAL, level) },
+    Kernel { name: "viewers of coats", run: |blocks, i, level| blocks.0[i].see(level) },
+    Kernel { name: "light on coats", run: |blocks, i, level| blocks.0[i].light_coats(level) },
+    Kernel { name: "samples of coats", run: |blocks, i, level| blocks.0[i].sample_coats(level) },
+    Kernel { name: "samples of dielectrics", run: |blocks, i, level| blocks.0[i].refract(level) },
+    Kernel { name: "numbers of lobes", run: |blocks, i, level| blocks.0[i].lobes(level) },
     Kernel { name: "scattering, diffuse", run: |blocks, i, level| blocks.0[i].scatter(DIFFUSE, level) },
     Kernel { name: "scattering, rough metal", run: |blocks, i, level| blocks.0[i].scatter(METAL, level) },
 ];
 
 const DIFFUSE: usize = 0;
 const METAL: usize = 1;
+
+/// Offset of the choice of the lobe.
+const LOBE: u32 = 3;
+
+/// Tables of rough coats; their values do not affect the time.
+static TABLES: CoatTables = [[[-100; 16]; 12]; 11];
 
 const OFFSETS: Offsets = Offsets { light: 0, choice: 1, scatter: 2, roulette: 4 };
 
@@ -56,6 +72,8 @@ struct Block {
     lights: EmitterBlock,
     light: LightBlock,
     bsdfs: [BsdfBlock; 2],
+    coats: CoatBlock,
+    glass: SpecularBlock,
     given: ScatterBlock,
     ones: Row3,
     raster: [Row; 2],
@@ -118,6 +136,24 @@ impl Block {
             BsdfBlock { reflectance, alpha, diffuse: 0xffff, metal: 0 },
             BsdfBlock { reflectance, alpha, diffuse: 0, metal: 0xffff },
         ];
+        // A rough varnish.
+        let mut coats = CoatBlock {
+            base: reflectance,
+            tint: [[1.0; 16]; 3],
+            mean: [[0.9; 16]; 3],
+            alpha,
+            exists: 0xffff,
+            dielectric: 0xffff,
+            ..CoatBlock::EMPTY
+        };
+        coats.see_reference(&surface, &TABLES);
+        let glass = SpecularBlock {
+            color: [[1.0; 16]; 3],
+            eta: [1.5; 16],
+            exists: 0xffff,
+            dielectric: 0xffff,
+            ..SpecularBlock::EMPTY
+        };
         let raster = [row(0.0, 640.0), row(0.0, 480.0)];
         Self {
             corners,
@@ -129,6 +165,8 @@ impl Block {
             lights,
             light,
             bsdfs,
+            coats,
+            glass,
             given: ScatterBlock::EMPTY,
             ones: [[1.0; 16]; 3],
             raster,
@@ -198,6 +236,18 @@ impl Block {
         black_box(level.map_or_else(|| samples.reference(), |level| samples.compute(level)));
     }
 
+    fn sky(&self, level: Option<Level>) {
+        let sky = SkyBlock { at: self.numbers.light, ..SkyBlock::EMPTY };
+        let to_world = Some([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        let samples = SkySamples { sky: &sky, to_world, active: 0xffff };
+        let (mut direction, mut pdf) = (self.ones, self.ones[0]);
+        black_box(match level {
+            None => samples.reference(&mut direction, &mut pdf),
+            Some(level) => samples.compute(level, &mut direction, &mut pdf),
+        });
+        black_box((&direction, &pdf));
+    }
+
     fn direct(&self, bsdf: usize, level: Option<Level>) {
         let direct = Direct {
             surface: &self.surface,
@@ -214,6 +264,61 @@ impl Block {
             Some(level) => direct.compute(level, &mut block),
         }
         black_box(&block);
+    }
+
+    fn see(&self, level: Option<Level>) {
+        let mut coats = black_box(&self.coats).clone();
+        match level {
+            None => coats.see_reference(&self.surface, &TABLES),
+            Some(level) => coats.see(level, &self.surface, &TABLES),
+        }
+        black_box(&coats);
+    }
+
+    fn light_coats(&self, level: Option<Level>) {
+        let Self { surface, coats, light, .. } = self;
+        let light = CoatLight { surface, coats, tables: &TABLES, direction: &light.direction };
+        let (mut value, mut pdf) = (self.ones, self.ones[0]);
+        match level {
+            None => light.reference(&mut value, &mut pdf),
+            Some(level) => light.compute(level, &mut value, &mut pdf),
+        }
+        black_box((&value, &pdf));
+    }
+
+    fn sample_coats(&self, level: Option<Level>) {
+        let Self { surface, coats, numbers, .. } = self;
+        let (u, lobe) = (&numbers.scatter, &numbers.choice);
+        let samples = CoatSamples { surface, coats, tables: &TABLES, u, lobe };
+        let mut out = ScatterBlock::EMPTY;
+        black_box(match level {
+            None => samples.reference(&mut out),
+            Some(level) => samples.compute(level, &mut out),
+        });
+        black_box(&out);
+    }
+
+    fn refract(&self, level: Option<Level>) {
+        let Self { surface, glass, numbers, .. } = self;
+        let samples = SpecularSamples { surface, specular: glass, lobe: &numbers.choice };
+        let mut out = ScatterBlock::EMPTY;
+        black_box(match level {
+            None => samples.reference(&mut out),
+            Some(level) => samples.compute(level, &mut out),
+        });
+        black_box(&out);
+    }
+
+    fn lobes(&self, level: Option<Level>) {
+        let samples = &self.samples;
+        let lobes: Row = match level {
+            None => core::array::from_fn(|i| {
+                let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());
+                single(key, index, samples.dimension[i] + LOBE)
+            }),
+            Some(level) => samples.singles(level, LOBE),
+        };
+        black_box(&lobes);
     }
 
     fn scatter(&self, bsdf: usize, level: Option<Level>) {

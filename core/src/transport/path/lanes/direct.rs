@@ -2,9 +2,9 @@
 
 use super::Estimated;
 use crate::Rgb;
-use crate::bsdf::Features;
+use crate::bsdf::{COATS, Features};
 use crate::geometry::Ray;
-use crate::light::emitted;
+use crate::light::{ChosenLight, emitted};
 use crate::sampling::Sampler;
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::block::{Block, Set, Stages, put_light};
@@ -15,6 +15,7 @@ use crate::transport::walk::dimension;
 use crate::transport::wavefront::{BLOCK, TO_ENVIRONMENT, Wavefront};
 use bytemuck::Zeroable;
 use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::coat::CoatLight;
 use halflight_simd::kernels::shade::direct::Direct;
 use halflight_simd::kernels::shade::emitter::EmitterSamples;
 use halflight_simd::kernels::shade::{at, put};
@@ -29,7 +30,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         estimated: &Estimated<'_, 'a>,
         mut lit: u32,
     ) {
-        let others = lit & !(block.bsdf.diffuse | block.bsdf.metal);
+        lit &= !(block.specular.exists | block.smooth_coats);
+        let others = lit & !block.in_lanes();
         block.side = block.surface.frame[2];
         for i in Set(others) {
             if block.others[i].is_delta() {
@@ -79,10 +81,17 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let environment = self.sample_lights(block, lit);
         for i in Set(others & block.light.exists) {
             let wi = block.point(i).frame.to_local(at(&block.light.direction, i).into());
-            let (f, pdf) =
-                block.others[i].evaluate_seen::<F>(block.coats[i], at(&block.surface.wo, i).into(), wi);
+            let (f, pdf) = block.others[i].evaluate::<F>(at(&block.surface.wo, i).into(), wi);
             put(&mut block.value, i, f.to_array());
             block.pdf[i] = pdf;
+        }
+        if block.coats.exists & block.light.exists != 0 {
+            let Block { surface, coats, light, value, pdf, .. } = &mut *block;
+            CoatLight { surface, coats, tables: &COATS, direction: &light.direction }.compute(
+                self.context.level,
+                value,
+                pdf,
+            );
         }
         if !E::ADDS_NOTHING {
             for i in Set(block.light.exists) {
@@ -94,7 +103,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         Direct { surface, bsdf, light, value, pdf, each, throughput }.compute(self.context.level, shadows);
         let mut none = (E::State::zeroed(), R::State::zeroed());
         for i in Set(block.shadows.exists) {
-            if R::IN_CIRCLES && others >> i & 1 == 1 {
+            if R::IN_CIRCLES && (others | block.coats.exists) >> i & 1 == 1 {
                 let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
                 let Some(Path { shared, .. }) = path else { continue };
                 R::sample_light(shared, || {
@@ -151,11 +160,19 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             // A visibility table holds for one side only.
             let table = if side == Vec3::ZERO { None } else { lights.visibility(position, side) };
             let warped = table.map(|table| table.warp(u));
-            let sample = lights.sample_chosen(scene, position, side, u, chosen, warped);
-            if let Some((sample, later)) = sample {
-                put_light(&mut block.light, i, &sample, position, later && lights.has_visibility());
-                environment |= u32::from(later) << i;
+            if let ChosenLight::Environment { probability } = chosen {
+                let is_put = lights.put_environment(&mut block.sky, i, (side, u), warped, probability);
+                environment |= u32::from(is_put) << i;
+                continue;
             }
+            let sample = lights.sample_chosen(scene, position, side, u, chosen, warped);
+            if let Some((sample, _)) = sample {
+                put_light(&mut block.light, i, &sample, position);
+            }
+        }
+        if environment != 0 {
+            let scene = (scene, self.context.level);
+            environment = lights.sample_environments(scene, &block.sky, &mut block.light, environment);
         }
         if areas != 0 {
             self.sample_areas(block, areas);

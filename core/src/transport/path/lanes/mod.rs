@@ -1,10 +1,10 @@
 //! Shading of blocks of vertices in lanes, by the kernels of `halflight_simd::kernels::shade`.
 //!
 //! A stage is either a kernel over all vertices of the block or a loop over them. Loops gather inputs, look
-//! up materials, textures and estimators, and replace the kernels at rare vertices: normal maps, degenerate
-//! triangles, BSDFs other than diffuse and rough metal, lights other than area lights. Vertices at which an
-//! estimator separates the coat or weighs samples are shaded one by one (`path/shade.rs`). Both compute the
-//! same bits.
+//! up materials, textures, cells of an environment map and estimators, and replace the kernels at rare
+//! vertices: normal maps, degenerate triangles, rough dielectrics, textured, point and directional lights.
+//! Vertices at which an estimator separates the coat or weighs samples are shaded one by one
+//! (`path/shade.rs`). Both compute the same bits.
 
 mod direct;
 mod scatter;
@@ -14,7 +14,7 @@ use super::block::{Block, Set, Stages};
 use super::estimator::{LightEstimator, PathVertex, RemainingLight};
 use super::shade::{Path, Shading};
 use super::sharing::{PathMemory, Sharing};
-use crate::bsdf::{Bsdf, Features};
+use crate::bsdf::{Bsdf, COATS, Features};
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
@@ -24,8 +24,8 @@ use crate::transport::wavefront::{BLOCK, Wavefront};
 use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::Vec3;
+use halflight_simd::kernels::shade::put;
 use halflight_simd::kernels::shade::surface::Surfaces;
-use halflight_simd::kernels::shade::{at, put};
 
 /// Vertices of a block as an estimator takes them, and the light that it leaves to their paths. None without
 /// an estimator.
@@ -193,7 +193,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     ) -> Stages {
         let mut none = (E::State::zeroed(), R::State::zeroed());
         let mut stages = Stages::default();
-        (block.bsdf.diffuse, block.bsdf.metal) = (0, 0);
+        block.clear_bsdfs();
         for i in Set(hits) {
             let index = block.path[i] as usize;
             let Some(mut path) = memory.path(wave.paths, index, &mut none) else { continue };
@@ -230,21 +230,10 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 }
             }
             stages.met |= one;
-            match bsdf {
-                Bsdf::Diffuse(b) => {
-                    put(&mut block.bsdf.reflectance, i, b.reflectance.to_array());
-                    block.bsdf.diffuse |= one;
-                }
-                Bsdf::Conductor(b) if F::GLOSSY && b.alpha > 0.0 => {
-                    put(&mut block.bsdf.reflectance, i, b.f0.to_array());
-                    block.bsdf.alpha[i] = b.alpha;
-                    block.bsdf.metal |= one;
-                }
-                _ => {
-                    block.coats[i] = bsdf.coat_view::<F>(at(&block.surface.wo, i).into());
-                    block.others[i] = bsdf;
-                }
-            }
+            block.put_bsdf::<F>(i, &bsdf, block.segments[i]);
+        }
+        if block.coats.exists != 0 {
+            block.coats.see(self.context.level, &block.surface, &COATS);
         }
         if E::ADDS_NOTHING {
             (stages.lit, stages.onward) = (stages.met, stages.met);

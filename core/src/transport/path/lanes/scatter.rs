@@ -2,7 +2,7 @@
 
 use super::Estimated;
 use crate::Rgb;
-use crate::bsdf::{Bsdf, BsdfSample, Diffuse, Features};
+use crate::bsdf::{Bsdf, BsdfSample, COATS, Diffuse, Features};
 use crate::sampling::Sampler;
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::block::{Block, Set};
@@ -14,7 +14,9 @@ use crate::transport::walk::dimension;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
 use crate::transport::wavefront::{BLOCK, Wavefront};
 use bytemuck::Zeroable;
+use halflight_simd::kernels::shade::coat::CoatSamples;
 use halflight_simd::kernels::shade::scatter::Scatter;
+use halflight_simd::kernels::shade::specular::SpecularSamples;
 use halflight_simd::kernels::shade::{at, put};
 
 /// Sets of vertices for [`Scatter`], and for the paths that go on.
@@ -59,8 +61,9 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             block.most[i] = most_probable(block.segments[i]);
             sets.cut |= u32::from(block.segments[i] >= MAX_VERTICES) << i;
         }
-        let others = onward & !(block.bsdf.diffuse | block.bsdf.metal);
+        let others = onward & !block.in_lanes();
         self.sample_others((block, memory), wave, others, &mut sets);
+        self.sample_coats((block, memory), wave, onward, &mut sets);
         if R::IN_CIRCLES {
             self.leave((block, memory), wave, &mut sets);
         }
@@ -80,7 +83,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         .compute(level, &mut block.next);
         self.go_on((block, memory), wave, estimated, &sets, counters);
         // Lanes do not change it.
-        if others != 0 {
+        if others | block.specular.exists != 0 {
             block.given.eta = [1.0; BLOCK];
         }
     }
@@ -103,7 +106,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
             let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobe];
             let wo = at(&block.surface.wo, i).into();
-            let Some(sample) = bsdf.sample_seen::<F>(block.coats[i], wo, u) else {
+            let Some(sample) = bsdf.sample::<F>(wo, u) else {
                 sets.active &= !(1 << i);
                 continue;
             };
@@ -118,6 +121,55 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             sets.cut |= u32::from(is_cut(segments, bsdf, &sample)) << i;
             sets.delta |= u32::from(sample.delta) << i;
             sets.transmits |= u32::from(bsdf.transmits()) << i;
+        }
+    }
+
+    /// Samples the coats and the smooth surfaces among the vertices `onward`.
+    #[inline]
+    fn sample_coats(
+        &self,
+        (block, memory): (&mut Block<'a>, &mut PathMemory<E::State, R>),
+        wave: &mut Wavefront,
+        onward: u32,
+        sets: &mut Sets,
+    ) {
+        let level = self.context.level;
+        let Block { surface, coats, specular, samples, numbers, given, .. } = &mut *block;
+        let of_coats = coats.exists & onward;
+        if of_coats | specular.exists & onward == 0 {
+            return;
+        }
+        let lobe = match of_coats | specular.dielectric {
+            0 => [0.0; BLOCK],
+            _ => samples.singles(level, dimension::LOBE),
+        };
+        if of_coats != 0 {
+            let samples = CoatSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe: &lobe };
+            let [exists, delta] = samples.compute(level, given);
+            sets.active &= exists | !coats.exists;
+            sets.delta |= delta;
+        }
+        if specular.exists != 0 {
+            let exists = SpecularSamples { surface, specular, lobe: &lobe }.compute(level, given);
+            sets.active &= exists | !specular.exists;
+            sets.delta |= specular.exists;
+            sets.transmits |= specular.dielectric;
+        }
+        if !R::IN_CIRCLES {
+            return;
+        }
+        let mut none = (E::State::zeroed(), R::State::zeroed());
+        for i in Set(sets.active & (block.coats.exists | block.specular.exists)) {
+            let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
+            let Some(Path { shared, .. }) = path else { continue };
+            R::sample_bsdf(shared, || match sets.delta >> i & 1 == 1 {
+                true => Rgb::ZERO,
+                false => {
+                    let f = Rgb::from(at(&block.given.weight, i)) * block.given.pdf[i];
+                    let wi = at(&block.given.direction, i).into();
+                    block.others[i].base_part(at(&block.surface.wo, i).into(), wi, f)
+                }
+            });
         }
     }
 
