@@ -117,8 +117,8 @@ impl<'m> LightSampler<'m> {
         self.environment.is_some_and(|environment| environment.put(block, i, u))
     }
 
-    /// Samples the environment at the vertices of `active`, into the block of lights. The radiance is still to
-    /// be multiplied by that of the environment. Returns the set of samples.
+    /// Samples the environment at the vertices of `active`, into the block of lights. The radiance is still
+    /// to be multiplied by that of the environment. Returns the set of samples.
     #[inline]
     pub(crate) fn sample_environments(
         &self,

@@ -281,8 +281,8 @@ mod tests {
     fn surfaces(random: &Random, i: u32) -> Bsdf {
         let [r, g, b, alpha, metallic, eta] = [0, 1, 2, 3, 4, 5].map(|k| random.single(20 * i + k));
         let (color, coat) = (Rgb::new(r, g, b), Rgb::new(b, r, g));
-        let alpha = if i % 3 == 0 { 0.0 } else { alpha.max(1e-3) };
-        let base = if i % 7 == 0 { Rgb::ZERO } else { color };
+        let alpha = if i.is_multiple_of(3) { 0.0 } else { alpha.max(1e-3) };
+        let base = if i.is_multiple_of(7) { Rgb::ZERO } else { color };
         match i % 5 {
             0 => Bsdf::Glossy(Glossy::new(base, coat, alpha, metallic)),
             1 => Bsdf::Mirror(Mirror { reflectance: color }),
@@ -305,7 +305,11 @@ mod tests {
                 let n = 16 * round + i as u32;
                 let number = |k: u32| random.single(20 * n + k);
                 let wo = uniform_sphere([number(6), number(7)]);
-                put(&mut block.surface.wo, i, [wo.x, wo.y, if n % 9 == 0 { 0.0 } else { wo.z.abs() }]);
+                put(
+                    &mut block.surface.wo,
+                    i,
+                    [wo.x, wo.y, if n.is_multiple_of(9) { 0.0 } else { wo.z.abs() }],
+                );
                 put(&mut block.light.direction, i, uniform_sphere([number(8), number(9)]).to_array());
                 (block.numbers.scatter[0][i], block.numbers.scatter[1][i]) = (number(10), number(11));
                 (lobe[i], all[i]) = (number(12), surfaces(&random, n));
