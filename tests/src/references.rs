@@ -1,5 +1,5 @@
-//! Path-traced references in `tests/tests/references.txt`: means of values over independent pictures, with their
-//! standard errors.
+//! Path-traced references in `tests/tests/references.txt`: means of values over independent pictures, with
+//! their standard errors.
 //!
 //!     REFERENCES=write cargo test --profile quick -p halflight-tests --test main
 //!

@@ -99,7 +99,7 @@ fn rows(
         }
     };
     let processors = thread::available_parallelism().map_or(1, usize::from);
-    thread::scope(|scope| (0..processors).for_each(|_| drop(scope.spawn(&work))));
+    thread::scope(|scope| (0..processors).for_each(|_| drop(scope.spawn(work))));
     rows.into_inner().expect("no panic holds it")
 }
 

@@ -1,6 +1,6 @@
 //! Records of lobes in rooms that are hard for caches: needles, a sheet between light and dark, black walls
-//! and a small bright spot, with floors of rough metal, narrow metal and varnish. `tests/examples/lobe_rooms.rs` prints
-//! a table of the same rooms in larger pictures.
+//! and a small bright spot, with floors of rough metal, narrow metal and varnish.
+//! `tests/examples/lobe_rooms.rs` prints a table of the same rooms in larger pictures.
 
 use halflight::render::{Method, Settings};
 use halflight_core::scene::Surface;
