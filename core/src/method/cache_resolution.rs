@@ -1,9 +1,9 @@
 //! Resolution of a cache: the gather rays of its records, and their density. Finer caches have less noise and
 //! take more time to fill.
 //!
-//! The first cache of a picture is filled at the coarsest resolution, and its rays are counted. Those of finer
-//! ones follow from them. A finer resolution is used where the picture is predicted to gain by it: the cache is
-//! then filled again.
+//! The first cache of a picture is filled at the coarsest resolution, and its rays are counted. Those of
+//! finer ones follow from them. A finer resolution is used where the picture is predicted to gain by it: the
+//! cache is then filled again.
 
 use super::work_of_detail;
 use crate::cache::irradiance::metric::HESSIAN_ERROR;
@@ -13,9 +13,9 @@ use crate::cache::irradiance::metric::HESSIAN_ERROR;
 const GATHER_RAY: f64 = 0.8;
 const GATHER_RAY_OF_FEW: f64 = 1.5;
 
-/// Rays of filling for each pixel of a picture of one pixel at [`CacheResolution::COARSEST`], in rays of paths;
-/// they fall with this power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a factor of
-/// two.
+/// Rays of filling for each pixel of a picture of one pixel at [`CacheResolution::COARSEST`], in rays of
+/// paths; they fall with this power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a
+/// factor of two.
 const FILLING_RAYS: f64 = 8550.0;
 const FILLING_POWER: f64 = 0.4;
 

@@ -33,7 +33,8 @@ pub struct CacheSettings {
 }
 
 impl CacheSettings {
-    /// Strata along a side of records that are seen, and behind rough surfaces, of which a pixel sees the mean.
+    /// Strata along a side of records that are seen, and of those behind rough surfaces, of which a pixel
+    /// sees the mean.
     pub(super) fn strata_of(strata: usize) -> [usize; 2] {
         [strata, strata.div_ceil(2 * BLOCK) * BLOCK]
     }
