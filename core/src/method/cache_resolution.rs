@@ -45,7 +45,7 @@ impl CacheResolution {
     pub const COARSEST: Self = Self { strata: 16, error: HESSIAN_ERROR };
 
     /// Resolutions that a cache may have, by the rays of filling.
-    pub const ALL: [Self; 5] = [
+    const ALL: [Self; 5] = [
         Self::COARSEST,
         Self { strata: 16, error: 3e-5 },
         Self { strata: 32, error: HESSIAN_ERROR },
@@ -81,21 +81,19 @@ impl Default for CacheResolution {
 /// Work and noise of a picture with a cache.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CachedPicture {
-    /// Rays of paths for which there is time; may be infinite.
+    /// Rays of paths for which there is time.
     pub rays: f64,
     /// relMSE × rays of light that no record supplies.
     pub samples: f64,
     /// Variance of the light of one gather ray, relative to the light of the picture.
     pub gathered: f64,
-    /// relMSE at which the picture ends, if any.
-    pub error: Option<f64>,
 }
 
 impl CachedPicture {
     /// Picture of so many `rays` of which only the time is known. Its cache is the finest for which there is
     /// time.
     pub fn of_time(rays: f64) -> Self {
-        Self { rays, samples: 0.0, gathered: 1.0, error: None }
+        Self { rays, samples: 0.0, gathered: 1.0 }
     }
 
     /// relMSE by records of `resolution`, however many samples there are.
@@ -112,32 +110,14 @@ impl CachedPicture {
         self.samples / (self.rays - filling.min(most)) + wider * self.floor(resolution)
     }
 
-    /// Rays until the picture has this `error`, or infinity.
-    fn rays_until(&self, error: f64, resolution: &CacheResolution, filling: f64) -> f64 {
-        match error - self.floor(resolution) {
-            left if left > 0.0 => filling + self.samples / left,
-            _ => f64::INFINITY,
-        }
-    }
-
-    /// The resolution with the least work until the picture ends by its error, or else with the least error
-    /// after its time. `filling` is the work of filling both caches at [`CacheResolution::COARSEST`], in rays
-    /// of paths.
+    /// The resolution with the least error after the time, of those that leave enough of it. `filling` is the
+    /// work of filling both caches at [`CacheResolution::COARSEST`], in rays of paths.
     pub fn resolution(&self, filling: f64) -> CacheResolution {
-        let is_affordable = |resolution: &CacheResolution| {
-            *resolution == CacheResolution::COARSEST
-                || filling * resolution.filling() <= FINER_FILLING * self.rays
-        };
-        let least = |of: &dyn Fn(&CacheResolution) -> f64| {
-            let affordable = CacheResolution::ALL.iter().filter(|resolution| is_affordable(resolution));
-            affordable.min_by(|a, b| of(a).total_cmp(&of(b))).copied().unwrap_or_default()
-        };
-        let filling = |resolution: &CacheResolution| filling * resolution.filling();
-        let by_time = || least(&|resolution| self.error_after(resolution, filling(resolution)));
-        let Some(error) = self.error else { return by_time() };
-        let rays = |resolution: &CacheResolution| self.rays_until(error, resolution, filling(resolution));
-        let by_error = least(&rays);
-        if rays(&by_error) < self.rays { by_error } else { by_time() }
+        let with = |resolution: &CacheResolution| filling * resolution.filling();
+        let is_affordable = |resolution: &&CacheResolution| with(resolution) <= FINER_FILLING * self.rays;
+        let error = |resolution: &CacheResolution| self.error_after(resolution, with(resolution));
+        let affordable = CacheResolution::ALL.iter().filter(is_affordable);
+        affordable.min_by(|a, b| error(a).total_cmp(&error(b))).copied().unwrap_or_default()
     }
 
     /// Work of counted `rays` of filling, in rays of paths, in a scene with this number of `triangles`.
@@ -168,23 +148,9 @@ mod tests {
 
     #[test]
     fn light_of_much_variance_has_more_rays_and_noise_of_samples_leaves_them_out() {
-        let of = |gathered, samples| {
-            CachedPicture { rays: 8e7, samples, gathered, error: None }.resolution(FILLING)
-        };
+        let of = |gathered, samples| CachedPicture { rays: 8e7, samples, gathered }.resolution(FILLING);
         assert_eq!(of(50.0, 1e4).strata, 32);
         assert_eq!(of(0.1, 1e6), CacheResolution::COARSEST);
         assert!(of(0.1, 1e3).error < CacheResolution::COARSEST.error);
-    }
-
-    #[test]
-    fn a_requested_error_has_the_cache_that_reaches_it_soonest() {
-        let of = |error| {
-            let picture =
-                CachedPicture { rays: f64::INFINITY, samples: 1e3, gathered: 5.0, error: Some(error) };
-            picture.resolution(FILLING)
-        };
-        assert_eq!(of(1e-2), CacheResolution::COARSEST);
-        assert_eq!(of(2e-4).strata, 32);
-        assert_eq!(of(1e-9), CacheResolution::FINEST);
     }
 }

@@ -244,7 +244,7 @@ impl Trial {
     /// Picture with a cache after so much work for each pixel, by the light that records supply
     /// ([`SUPPLIES`]), and its relMSE. `rare` is the noise of paths by rare light, as a factor on that of the
     /// trial.
-    fn cached(&self, supply: usize, (work, error): (f64, Option<f64>), rare: f64) -> (CachedPicture, f64) {
+    fn cached(&self, supply: usize, work: f64, rare: f64) -> (CachedPicture, f64) {
         let cached_ray = CACHED_RAY * work_of_detail(self.triangles);
         let product = rare * self.noise[supply] * cached_ray * self.work[supply];
         let pixels = self.pixels / self.shards;
@@ -252,7 +252,6 @@ impl Trial {
             rays: work * pixels,
             samples: product * pixels,
             gathered: rare * (self.noise[0] - self.noise[supply]).max(0.0),
-            error,
         };
         let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
         let filling = |resolution: CacheResolution| {
@@ -299,7 +298,7 @@ impl Trial {
         let [(first, cache), (second, radiance_cache)] =
             [(IRRADIANCE, may_have_cache), (RADIANCE, may_have_cache && self.has_lobes)].map(
                 |(supply, is_choice)| {
-                    let (picture, error) = self.cached(supply, (work, goal.error), rare);
+                    let (picture, error) = self.cached(supply, work, rare);
                     (picture, if is_choice { error } else { f64::INFINITY })
                 },
             );

@@ -196,20 +196,17 @@ impl<'a> RenderSetup<'a> {
         Goal { rays: self.most_rays(), samples: stop.most_samples(), error: stop.error }
     }
 
-    /// Whether rays and density of records may be chosen: neither settings nor files fix them.
+    /// Whether rays and density of records may be chosen: time alone ends the picture, and neither settings
+    /// nor files fix them. A film by samples or error is resumed without the trial, to the same bits.
     pub(super) fn has_open_cache(&self) -> bool {
         let Settings { cache, load_cache, save_cache, .. } = self.settings;
-        cache.is_open() && load_cache.is_none() && save_cache.is_none()
+        let is_timed = matches!(self.goal(), Goal { rays: Some(_), samples: None, error: None });
+        is_timed && cache.is_open() && load_cache.is_none() && save_cache.is_none()
     }
 
-    /// Picture of a requested cache, if time alone ends it.
+    /// Picture of a requested cache, if its time is limited.
     fn cached_picture(&self) -> Option<CachedPicture> {
-        match self.goal() {
-            Goal { rays: Some(rays), samples: None, error: None } => {
-                Some(CachedPicture::of_time(rays / f64::from(self.settings.shard.count)))
-            }
-            _ => None,
-        }
+        Some(CachedPicture::of_time(self.most_rays()? / f64::from(self.settings.shard.count)))
     }
 
     /// Context for methods of the core.
