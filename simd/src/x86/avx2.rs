@@ -148,15 +148,8 @@ impl Lanes for F8 {
     #[inline(always)]
     fn neighbours(self, table: &[i16]) -> [Self; 2] {
         let Some(last) = table.len().checked_sub(2) else { return [self.all(0.0); 2] };
-        // SAFETY: as above; four bytes from an index of at most `last` on are inside the table.
-        unsafe {
-            let last = _mm256_set1_epi32(last.min(1 << 24) as i32);
-            let i = _mm256_max_epi32(_mm256_cvttps_epi32(self.0), _mm256_setzero_si256());
-            let both = _mm256_i32gather_epi32::<2>(table.as_ptr().cast(), _mm256_min_epi32(i, last));
-            let first = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(both));
-            let second = _mm256_srai_epi32::<16>(both);
-            [Self(_mm256_cvtepi32_ps(first)), Self(_mm256_cvtepi32_ps(second))]
-        }
+        // SAFETY: as above; four bytes from `last` on are inside the table.
+        unsafe { neighbours8(self.0, table.as_ptr(), last.min(1 << 24) as i32).map(Self) }
     }
     #[inline(always)]
     fn largest(self) -> f32 {
@@ -463,3 +456,19 @@ static PACK: [u64; 256] = {
     }
     table
 };
+
+/// Entries at `indices` and behind them, at most at `last`.
+///
+/// # Safety
+/// The processor has AVX2, and two entries from `last` on can be read.
+#[inline(always)]
+pub(super) unsafe fn neighbours8(indices: __m256, table: *const i16, last: i32) -> [__m256; 2] {
+    // SAFETY: the caller's.
+    unsafe {
+        let i = _mm256_max_epi32(_mm256_cvttps_epi32(indices), _mm256_setzero_si256());
+        let i = _mm256_min_epi32(i, _mm256_set1_epi32(last));
+        let both = _mm256_i32gather_epi32::<2>(table.cast(), i);
+        let first = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(both));
+        [_mm256_cvtepi32_ps(first), _mm256_cvtepi32_ps(_mm256_srai_epi32::<16>(both))]
+    }
+}

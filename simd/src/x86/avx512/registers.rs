@@ -1,6 +1,7 @@
 //! Registers of AVX-512 and the arithmetic of their lanes.
 
 use crate::lanes::{EXPONENT, Lanes, Mask};
+use crate::x86::avx2::neighbours8;
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -194,22 +195,6 @@ unsafe fn smallest8(lanes: __m256) -> f32 {
         let four = _mm_min_ps(_mm256_castps256_ps128(lanes), _mm256_extractf128_ps::<1>(lanes));
         let two = _mm_min_ps(four, _mm_movehl_ps(four, four));
         _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps::<1>(two, two)))
-    }
-}
-
-/// Entries at `indices` and behind them, at most at `last`.
-///
-/// # Safety
-/// The processor has AVX2, and two entries from `last` on can be read.
-#[inline(always)]
-unsafe fn neighbours8(indices: __m256, table: *const i16, last: i32) -> [__m256; 2] {
-    // SAFETY: the caller's.
-    unsafe {
-        let i = _mm256_max_epi32(_mm256_cvttps_epi32(indices), _mm256_setzero_si256());
-        let i = _mm256_min_epi32(i, _mm256_set1_epi32(last));
-        let both = _mm256_i32gather_epi32::<2>(table.cast(), i);
-        let first = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(both));
-        [_mm256_cvtepi32_ps(first), _mm256_cvtepi32_ps(_mm256_srai_epi32::<16>(both))]
     }
 }
 
