@@ -1,7 +1,9 @@
 //! Path-traced references in `tests/tests/references.txt`: means of values over independent pictures, with
 //! their standard errors.
 //!
-//!     REFERENCES=write cargo test --profile quick -p halflight-tests --test main
+//! ```text
+//! REFERENCES=write cargo test --profile quick -p halflight-tests --test main
+//! ```
 //!
 //! renders those of the tests that it runs anew. A scene that changes needs it.
 

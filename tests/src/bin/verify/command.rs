@@ -1,6 +1,7 @@
 //! Child processes: prints each command line, and names it if it fails.
 
 use crate::{Failure, Outcome};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -33,6 +34,28 @@ pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(Failure::Failed(format!("`{shown}`: {status}"))),
         Err(error) => Err(Failure::Missing(format!("`{shown}` does not start: {error}"))),
+    }
+}
+
+/// Runs a command with its output on the terminal. The reason of a failure includes the parts of its standard
+/// output between a line `first` and one that starts with `last`.
+pub(crate) fn run_with_report(command: &mut Command, first: &str, last: &str) -> Result<(), Failure> {
+    let shown = show(command);
+    println!("$ {shown}");
+    let missing = |error| Failure::Missing(format!("`{shown}` does not start: {error}"));
+    let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn().map_err(missing)?;
+    let (mut report, mut is_inside) = (String::new(), false);
+    for line in child.stdout.take().into_iter().flat_map(|out| BufReader::new(out).lines()) {
+        let Ok(line) = line else { continue };
+        println!("{line}");
+        is_inside = (is_inside || line == first) && !line.starts_with(last);
+        if is_inside {
+            report += &format!("\n    {line}");
+        }
+    }
+    match child.wait().map_err(missing)? {
+        status if status.success() => Ok(()),
+        status => Err(Failure::Failed(format!("`{shown}`: {status}{report}"))),
     }
 }
 

@@ -7,7 +7,7 @@ use std::fs;
 use std::process::{Command, Stdio};
 
 /// Longest smoke run of a target, seconds; anything longer is a campaign.
-pub(crate) const SMOKE_SECONDS: u32 = 20;
+pub(crate) const SMOKE_SECONDS: u32 = 10;
 
 /// Runs of each target in a smoke run: the corpus and some hundreds of mutations.
 const SMOKE_RUNS: i32 = 400;

@@ -137,5 +137,5 @@ fn usage() -> String {
     }
     text += &format!("  {QUICK:<8} source, fmt, unit and table: what to run after an edit\n");
     text + "\n--allow-missing    a step whose tool is not on this machine is skipped instead of failing\n\
-            --fuzz-seconds N   how long each fuzz target runs; 20 if not said, 600 for a campaign"
+            --fuzz-seconds N   how long each fuzz target runs; 10 if not said, 600 for a campaign"
 }

@@ -1,6 +1,6 @@
 //! Format, lints, tests and documentation, by cargo.
 
-use crate::command::{command, run};
+use crate::command::{command, run, run_with_report};
 use crate::{Outcome, Project};
 
 /// Directories with their own workspace.
@@ -32,7 +32,9 @@ pub(crate) fn clippy(project: &Project) -> Outcome {
 }
 
 pub(crate) fn test(project: &Project) -> Outcome {
-    run(&mut command(&project.root, "cargo test --profile quick --workspace --locked"))?;
+    let line = "cargo test --profile quick --workspace --locked --no-fail-fast";
+    // libtest prints messages and names of failed tests between these lines.
+    run_with_report(&mut command(&project.root, line), "failures:", "test result:")?;
     Ok("all passed".to_owned())
 }
 
