@@ -13,7 +13,7 @@ pub use goal::Goal;
 
 use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::caustics::{self, CausticPathTracing};
-use super::counts::{self, LightPaths};
+use super::counts::{self, LightPaths, pilot};
 use super::executor::{Executor, Passed};
 use super::{RenderContext, work_of_detail};
 use crate::Rgb;
@@ -37,6 +37,10 @@ const BLOCK: usize = 64;
 const PILOT_RAYS: f64 = 5e5;
 const PILOT_SHARE: f64 = 0.08;
 
+/// Work of a pixel of the pilot, and the fraction of the work that its pixels may take where it is larger.
+const RAYS_OF_PILOT_PIXEL: f64 = 90.0;
+const PILOT_PIXELS: f64 = 0.02;
+
 /// Work of a ray of cached paths in a scene of few triangles, with its share of look-ups. It is below one
 /// because noise of light samples falls faster than with the inverse of their number.
 const CACHED_RAY: f64 = 0.8;
@@ -54,7 +58,7 @@ const LIGHT_PATHS_FACTOR: f64 = 2.0;
 /// estimates, and noise that sixteen samples of a block do not show.
 const PHOTONS_FACTOR: f64 = 6.0;
 
-/// Greatest relMSE of path tracing: all light is missing.
+/// Greatest relMSE of path tracing and of caches: all light is missing.
 const ALL_IS_MISSING: f64 = 1.0;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
@@ -151,8 +155,8 @@ pub struct Trial {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Predictions {
     paths: f64,
-    /// Noise of paths by rare light, as a factor on that of the trial.
-    rare: f64,
+    /// Noise of a sample of all light, and of that which no record supplies, for each of [`SUPPLIES`].
+    noise: [f64; SUPPLIES],
     light_paths: f64,
 }
 
@@ -242,16 +246,15 @@ impl Trial {
     }
 
     /// Picture with a cache after so much work for each pixel, by the light that records supply
-    /// ([`SUPPLIES`]), and its relMSE. `rare` is the noise of paths by rare light, as a factor on that of the
-    /// trial.
-    fn cached(&self, supply: usize, work: f64, rare: f64) -> (CachedPicture, f64) {
+    /// ([`SUPPLIES`]), and its relMSE. `noise` is that of samples of each.
+    fn cached(&self, supply: usize, work: f64, noise: &[f64; SUPPLIES]) -> (CachedPicture, f64) {
         let cached_ray = CACHED_RAY * work_of_detail(self.triangles);
-        let product = rare * self.noise[supply] * cached_ray * self.work[supply];
+        let product = noise[supply] * cached_ray * self.work[supply];
         let pixels = self.pixels / self.shards;
         let picture = CachedPicture {
             rays: work * pixels,
             samples: product * pixels,
-            gathered: rare * (self.noise[0] - self.noise[supply]).max(0.0),
+            gathered: (noise[0] - noise[supply]).max(0.0),
         };
         let of_lobes = if supply > IRRADIANCE { FILLING_OF_LOBES } else { 1.0 };
         let filling = |resolution: CacheResolution| {
@@ -270,10 +273,29 @@ impl Trial {
             light_paths.and_then(|pilot| pilot.of_paths).map(|product| self.reuse * product / work);
         let factor = if self.has_photons { PHOTONS_FACTOR } else { 1.0 };
         let paths = (factor * of_trial).max(of_pilot.unwrap_or(0.0).min(ALL_IS_MISSING));
+        // Rare light is that of records or of the rest; the picture lacks a rest that no path would find.
+        let [first, second] = light_paths.and_then(|pilot| pilot.of_rest).unwrap_or_default();
+        let of_rest = [0.0, first, second];
+        let noise = core::array::from_fn(|i| match of_rest[i] * self.work[i] < ALL_IS_MISSING * work {
+            true if i > 0 => of_rest[i].max(factor * self.noise[i]),
+            _ => self.noise[i] * paths / of_trial,
+        });
         Predictions {
             paths,
-            rare: paths / of_trial,
+            noise,
             light_paths: light_paths.map_or(f64::INFINITY, |pilot| LIGHT_PATHS_FACTOR * pilot.product / work),
+        }
+    }
+
+    /// Pixels of the picture for each of the pilot of light paths: few where time alone ends the picture. A
+    /// film by samples must find the same counts again when it is resumed.
+    pub fn part_of_pilot(&self, goal: &Goal) -> usize {
+        match *goal {
+            Goal { rays: Some(rays), samples: None, error: None } => {
+                let pixels = PILOT_PIXELS * rays / RAYS_OF_PILOT_PIXEL;
+                ((self.pixels / pixels) as usize).clamp(1, pilot::PART)
+            }
+            _ => pilot::PART,
         }
     }
 
@@ -294,12 +316,12 @@ impl Trial {
             return (Best::Paths, Finding::new("method", Used, "paths show no noise"));
         }
         let work = self.budget(goal);
-        let Predictions { paths, rare, light_paths } = self.predict(work, light_paths);
+        let Predictions { paths, noise, light_paths } = self.predict(work, light_paths);
         let [(first, cache), (second, radiance_cache)] =
             [(IRRADIANCE, may_have_cache), (RADIANCE, may_have_cache && self.has_lobes)].map(
                 |(supply, is_choice)| {
-                    let (picture, error) = self.cached(supply, work, rare);
-                    (picture, if is_choice { error } else { f64::INFINITY })
+                    let (picture, error) = self.cached(supply, work, &noise);
+                    (picture, if is_choice { error.min(ALL_IS_MISSING) } else { f64::INFINITY })
                 },
             );
         let cached = cache.min(radiance_cache);
@@ -357,3 +379,6 @@ fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
         })?;
     Ok(is_complete.then_some(tiles))
 }
+
+#[cfg(test)]
+mod tests;

@@ -44,6 +44,8 @@ pub struct Choice {
     pub noise: f32,
     /// See `noise`.
     pub work: f32,
+    /// See [`Found::noise_of_rest`].
+    pub noise_of_rest: [f32; 2],
     /// Reason for the number of light paths.
     pub light_paths: &'static str,
     /// Reason for the number of connections.
@@ -58,14 +60,14 @@ pub fn scratch<F: Features>() -> Footprint {
     pilot::scratch::<F>().or(Bidirectional::<F>::scratch(&settings))
 }
 
-/// Counts for a picture of `context`, as far as `settings` leave them open; `None` where all are given or
-/// memory is too short for a pilot.
+/// Counts for a picture of `context`, as far as `settings` leave them open, by a pilot with one pixel for
+/// each `part` of the picture; `None` where all are given or memory is too short for a pilot.
 ///
 /// # Errors
 /// [`OutOfMemory`] where the scratch of the executor is smaller than [`scratch`].
 pub fn choose<'a, F: Features>(
     context: &RenderContext<'a>,
-    settings: &BidirectionalSettings,
+    (settings, part): (&BidirectionalSettings, usize),
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
 ) -> Result<Option<Choice>, OutOfMemory> {
@@ -86,7 +88,8 @@ pub fn choose<'a, F: Features>(
     let candidates = Candidate::all(&given);
     let merges = may_merge && merging != Some(false);
     let emission = Bidirectional::<F>::emission(context, (merges, 0), memory, executor)?;
-    let Some(found) = pilot::run::<F>(context, &emission, (&candidates, may_merge), memory, executor)? else {
+    let Some(found) = pilot::run::<F>(context, &emission, (&candidates, may_merge, part), memory, executor)?
+    else {
         return Ok(None);
     };
     let without = match may_merge {
@@ -116,10 +119,20 @@ fn structural(context: &RenderContext) -> Option<&'static str> {
 /// Noise × work by the pilot: relative variance of a sample of a pixel, times its rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightPaths {
-    /// Product of light paths with the chosen counts.
+    /// Product of light paths with the chosen counts; infinite where they are no choice.
     pub product: f64,
     /// Product of path tracing; `None` if caustic photons supply light that its paths rarely find.
     pub of_paths: Option<f64>,
+    /// Noise of path tracing for the rest beside records of irradiance, and beside those of lobes, not times
+    /// work; `None` as above.
+    pub of_rest: Option<[f64; 2]>,
+}
+
+impl LightPaths {
+    /// The same, where light paths are no choice.
+    pub fn of_others(self) -> Self {
+        Self { product: f64::INFINITY, ..self }
+    }
 }
 
 /// Finding on `topic`, if the part is used.
@@ -172,6 +185,7 @@ impl Choice {
             gain_of_connections: 1.0,
             noise: 0.0,
             work: 0.0,
+            noise_of_rest: [0.0; 2],
             light_paths: reason,
             connections: without,
             merging: None,
@@ -197,6 +211,7 @@ impl Choice {
             gain_of_connections: if unconnected > 0.0 { unconnected / (noise * work) } else { 0.0 },
             noise,
             work,
+            noise_of_rest: found.noise_of_rest,
             light_paths: "they reduce noise for the work by a pilot",
             connections: match counts.connections {
                 0 => "splats alone have less noise for the work by a pilot",
@@ -211,12 +226,13 @@ impl Choice {
         }
     }
 
-    /// Noise × work of the pilot beside path tracing with these `findings`; `None` without light paths.
+    /// Noise × work of the pilot beside path tracing with these `findings`; `None` without a pilot.
     pub fn products(&self, findings: &Findings) -> Option<LightPaths> {
         let product = f64::from(self.noise) * f64::from(self.work);
-        let gain = self.gain.filter(|_| self.counts.light_paths > 0.0)?;
-        let of_paths = (!has_caustic_photons(findings)).then_some(f64::from(gain) * product);
-        Some(LightPaths { product, of_paths })
+        let gain = self.gain?;
+        let is_rare = !has_caustic_photons(findings);
+        let of_paths = is_rare.then_some(f64::from(gain) * product);
+        Some(LightPaths { product, of_paths, of_rest: is_rare.then_some(self.noise_of_rest.map(f64::from)) })
     }
 
     /// The choice beside path tracing with its own means, path reuse and caustic photons, by its `findings`.
@@ -237,10 +253,11 @@ impl Choice {
         })
     }
 
-    /// Path tracing for a `reason`, where the gain is too small.
+    /// Path tracing for a `reason`, where the gain is too small. What the pilot has found stays.
     fn or_paths(self, reason: &'static str) -> Self {
+        let Self { counts, light_paths, connections, merging, .. } = Self::paths(reason);
         match self.gain <= Some(LEAST_GAIN) {
-            true => Self { gain: self.gain, ..Self::paths(reason) },
+            true => Self { counts, light_paths, connections, merging, ..self },
             false => self,
         }
     }

@@ -26,13 +26,15 @@ use crate::transport::bidirectional::vertex::LightVertex;
 use crate::transport::{Counters, PathSettings};
 use bytemuck::{Pod, Zeroable};
 
-/// Pixels of the small picture, and how many of those of the picture each stands for at least.
+/// Pixels of the small picture, at most.
 const PIXELS: usize = 16 * PIXELS_PER_TILE;
-const LEAST_PART: usize = 8;
+
+/// Pixels of the picture for each of the small one, where nothing else is said.
+pub const PART: usize = 8;
 
 /// Samples of a pixel, each with light paths of its own.
 const SAMPLES: u32 = 2;
-const PART: f32 = 1.0 / SAMPLES as f32;
+const SAMPLE: f32 = 1.0 / SAMPLES as f32;
 
 /// Connections of a camera vertex, and pixels for each light path; one where vertices are merged.
 const CONNECTIONS: u32 = 2;
@@ -49,8 +51,13 @@ const WEIGHTINGS: usize = 1 + CHOSEN.len();
 const BLOCK: usize = 64;
 const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
-/// Values of the pixels of a tile by the counts of each candidate, one sample less the other.
-const SUMS: usize = CANDIDATES * PIXELS_PER_TILE;
+/// Ways to find light: by the counts of each candidate, and by path tracing the rest beside records of
+/// irradiance, and beside those of lobes ([`Rest`]).
+const WAYS: usize = CANDIDATES + RESTS;
+const RESTS: usize = 2;
+
+/// Values of the pixels of a tile by each way, one sample less the other.
+const SUMS: usize = WAYS * PIXELS_PER_TILE;
 
 /// Least variance relative to the second moment: the estimate of the variance is noisy.
 const LEAST_VARIANCE: f32 = 0.05;
@@ -60,6 +67,8 @@ const LEAST_VARIANCE: f32 = 0.05;
 pub struct Found {
     /// Relative variance of a sample of a pixel with the counts of each candidate, in their order.
     pub noise: [f32; CANDIDATES],
+    /// The same of path tracing, for the rest beside records of irradiance, and beside those of lobes.
+    pub noise_of_rest: [f32; RESTS],
     /// Work of its techniques.
     pub work: Work,
     /// Fraction of the light that merges bring.
@@ -76,9 +85,9 @@ struct Block {
     merged: f32,
     /// Shadow rays of connections.
     connections: f32,
-    /// Variance and second moment by the counts of each candidate.
-    variance: [f32; CANDIDATES],
-    square: [f32; CANDIDATES],
+    /// Variance and second moment by each way.
+    variance: [f32; WAYS],
+    square: [f32; WAYS],
 }
 
 /// The light paths of a pass with the weights of one way.
@@ -97,11 +106,11 @@ pub fn scratch<F: Features>() -> Footprint {
     lists.and(CameraPaths::<F>::scratch(CONNECTIONS)).or(LightPass::<F>::scratch())
 }
 
-/// The small picture of `context`.
-fn small(settings: PathSettings) -> PathSettings {
+/// The small picture, with one pixel for each `part` of that of `settings`.
+fn small(settings: PathSettings, part: usize) -> PathSettings {
     let PathSettings { width, height, seed, .. } = settings;
     let pixels = width as usize * height as usize;
-    let part = (pixels as f32 / PIXELS as f32).max(LEAST_PART as f32);
+    let part = (pixels as f32 / PIXELS as f32).max(part as f32);
     let scale = 1.0 / libm::sqrtf(part);
     let scaled = |pixels: u32| ((pixels as f32 * scale) as u32).max(1);
     // Numbers that the picture does not have.
@@ -122,20 +131,20 @@ fn footprint(tasks: usize, tiles: usize, merging: bool) -> Footprint {
     footprint.and(photons)
 }
 
-/// Runs the pilot of a picture of `context` for `candidates`, whose light paths are those of `emission`,
-/// with `merging` or without: merges show what other techniques hardly find, even where no candidate has
-/// them. `None` where memory is short or the executor is over.
+/// Runs the pilot of a picture of `context` for `candidates`, whose light paths are those of `emission`, with
+/// one pixel for each `part` of the picture, and with `merging` or without: merges show what other techniques
+/// hardly find, even where no candidate has them. `None` where memory is short or the executor is over.
 ///
 /// # Errors
 /// [`OutOfMemory`] where the scratch of the executor is smaller than [`scratch`].
 pub fn run<'a, F: Features>(
     context: &RenderContext,
     emission: &EmissionSampler,
-    (candidates, merging): (&[Candidate; CANDIDATES], bool),
+    (candidates, merging, part): (&[Candidate; CANDIDATES], bool, usize),
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
 ) -> Result<Option<Found>, OutOfMemory> {
-    let context = RenderContext { settings: small(context.settings), ..*context };
+    let context = RenderContext { settings: small(context.settings, part), ..*context };
     let PathSettings { width, height, .. } = context.settings;
     let pixels_per_path = if merging { 1 } else { PIXELS_PER_LIGHT_PATH };
     let tasks = (context.pixels() / pixels_per_path).div_ceil(PATHS_PER_TASK).max(1);

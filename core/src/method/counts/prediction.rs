@@ -10,7 +10,7 @@
 //! Light that n′ finds seldom counts as much as it will in the long run, although a pilot with n′ would not
 //! see it.
 
-use crate::transport::bidirectional::contribution::{CLASSES, Class, Contribution};
+use crate::transport::bidirectional::contribution::{CLASSES, Class, Contribution, Rest};
 use bytemuck::{Pod, Zeroable};
 
 /// Classes whose counts are chosen.
@@ -116,6 +116,11 @@ impl Weighed {
     /// Pixel of the tile.
     pub fn place(&self) -> usize {
         self.contribution.place()
+    }
+
+    /// Records that do not supply the light.
+    pub fn rest(&self) -> Rest {
+        self.contribution.rest()
     }
 
     /// Value with the counts of the pilot.

@@ -7,6 +7,7 @@ use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::contribution::{Class, Contribution};
 use crate::transport::bidirectional::mis::Sums;
+use crate::transport::walk::history::{History, Rest};
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -42,6 +43,8 @@ pub(super) struct CameraPath {
     pub(super) eta_squared: f32,
     /// Random numbers of the lens, which the first vertex is projected with.
     pub(super) lens: [f32; 2],
+    /// Rough vertices so far, for the pilot of counts.
+    pub(super) history: History,
 }
 
 impl CameraPath {
@@ -88,6 +91,9 @@ pub(super) struct Vertex<'v> {
 /// The bit of a shadow ray's tag that says that it belongs to a connection.
 const CONNECTION: u32 = 1 << 31;
 
+/// Least bit of the [`Rest`] in the tag.
+const REST: u32 = 29;
+
 /// Shadow rays of a wave, whose tag is the index of their path.
 pub(super) struct Queue<'w> {
     pub(super) shadows: ShadowRays<'w>,
@@ -97,10 +103,11 @@ pub(super) struct Queue<'w> {
 }
 
 impl Queue<'_> {
-    pub(super) fn push(&mut self, class: Class, path: u32, ray: Ray, light: Rgb) {
+    pub(super) fn push(&mut self, (class, rest): (Class, Rest), path: u32, ray: Ray, light: Rgb) {
         let slots = (self.shadows.rays.get_mut(self.count), self.shadows.light.get_mut(self.count));
         if let (Some(slot), Some(arrives)) = slots {
-            let tag = if class == Class::Connections { path | CONNECTION } else { path };
+            let connection = if class == Class::Connections { CONNECTION } else { 0 };
+            let tag = path | connection | rest.bits() << REST;
             if let Some(recorder) = &mut self.recorder {
                 recorder.connections += u64::from(class == Class::Connections);
             }
@@ -109,16 +116,17 @@ impl Queue<'_> {
         }
     }
 
-    /// The path and the class of a shadow ray by its `tag`.
-    pub(super) fn of_tag(tag: u32) -> (usize, Class) {
+    /// The path of a shadow ray by its `tag`, its class and the rest that its light belongs to.
+    pub(super) fn of_tag(tag: u32) -> (usize, (Class, Rest)) {
         let class = if tag & CONNECTION == 0 { Class::Paths } else { Class::Connections };
-        ((tag & !CONNECTION) as usize, class)
+        let rest = Rest::from_bits(tag >> REST);
+        ((tag & ((1 << REST) - 1)) as usize, (class, rest))
     }
 
     /// Records what `path` has got since it had `before`.
-    pub(super) fn record(&mut self, class: Class, path: &CameraPath, before: [f32; 3]) {
+    pub(super) fn record(&mut self, class: Class, rest: Rest, path: &CameraPath, before: [f32; 3]) {
         if let Some(recorder) = &mut self.recorder {
-            recorder.push(class, path.place, Rgb::from(path.radiance) - Rgb::from(before));
+            recorder.push((class, rest), path.place, Rgb::from(path.radiance) - Rgb::from(before));
         }
     }
 }
@@ -133,10 +141,10 @@ pub(super) struct Recorder<'w> {
 
 impl Recorder<'_> {
     /// Appends `light` of pixel `place`; none where it is zero or the list is full.
-    pub(super) fn push(&mut self, class: Class, place: u32, light: Rgb) {
+    pub(super) fn push(&mut self, (class, rest): (Class, Rest), place: u32, light: Rgb) {
         let value = light.element_sum() / 3.0;
         if let Some(slot) = self.list.get_mut(self.count).filter(|_| value > 0.0) {
-            *slot = Contribution::new(class, place, value);
+            *slot = Contribution::new(class, place, value).with_rest(rest);
             self.count += 1;
         }
     }

@@ -292,7 +292,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let before = path.radiance;
         if !hit.is_some() {
             self.escape(path, direction);
-            queue.record(Class::Paths, path, before);
+            queue.record(Class::Paths, path.history.rest_of_hit(), path, before);
             return None;
         }
         let point = self.context.surface_at(ray, hit)?;
@@ -309,12 +309,13 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return Some(point.spawn(direction));
         }
         self.emission(path, &point, hit, direction);
-        queue.record(Class::Paths, path, before);
+        queue.record(Class::Paths, path.history.rest_of_hit(), path, before);
         path.travelled += hit.t;
         if path.segments >= self.settings.max_depth {
             return None;
         }
         let bsdf = self.context.bsdf_at(&point);
+        path.history = path.history.from_camera(&bsdf);
         let wo = point.frame.to_local(-direction);
         let is_bent = is_bent(&point, wo);
         let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, &bsdf, direction) };
@@ -327,7 +328,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             Vertex { point: &point, bsdf: &bsdf, wo, sums, is_first_rough, eta_vcm, is_bent, sampler };
         let before = path.radiance;
         self.merge(path, &vertex);
-        queue.record(Class::Merges, path, before);
+        queue.record(Class::Merges, path.history.rest(), path, before);
         if !bsdf.is_delta() {
             self.light_sample(path, &vertex, ray.tag, queue);
             if !is_bent {

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+pub use crate::transport::walk::history::Rest;
+
 /// Techniques whose counts are chosen together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
@@ -26,7 +28,7 @@ impl Class {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Contribution {
-    /// Pixel of the tile, and class.
+    /// Pixel of the tile, class and rest.
     key: u32,
     /// Mean radiance of the channels.
     pub value: f32,
@@ -36,6 +38,16 @@ impl Contribution {
     /// Contribution of a technique of `class` to pixel number `place` of the tile, below 2²⁴.
     pub fn new(class: Class, place: u32, value: f32) -> Self {
         Self { key: place | (class as u32) << 24, value }
+    }
+
+    /// The same contribution, of light of a `rest`.
+    pub fn with_rest(self, rest: Rest) -> Self {
+        Self { key: self.key & 0x00ff_ffff | (self.class() as u32 | rest.bits() << 4) << 24, ..self }
+    }
+
+    /// Records that do not supply the light.
+    pub fn rest(&self) -> Rest {
+        Rest::from_bits(self.key >> 28)
     }
 
     /// Pixel of the tile.

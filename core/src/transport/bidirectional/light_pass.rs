@@ -15,6 +15,7 @@ use crate::transport::bidirectional::mis::{Counts, Sums, weight_of_splat};
 use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf, scattering_from_light};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::history::Rest;
 use crate::transport::walk::light::{
     Continuation, LightPathState, LightWalk, MAX_CONTINUATION, Vertex, Visitor,
 };
@@ -32,6 +33,14 @@ pub(super) const SEED: u64 = 0x6269_6469_7265_6374;
 
 /// Shadow rays to the camera that are traced together.
 const SHADOW_RAYS: usize = 1024;
+
+/// Least bit of the [`Rest`] in a marked splat.
+const REST: u32 = 30;
+
+/// The pixel of a marked splat, and the records that do not supply its light.
+pub fn marked(pixel: u32) -> (u32, Rest) {
+    (pixel & ((1 << REST) - 1), Rest::from_bits(pixel >> REST))
+}
 
 /// The outcome of a task beside its vertices and splats.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -59,6 +68,8 @@ pub struct LightPass<'a, F> {
     merging: Option<MergeRadii>,
     /// Light paths of the pass.
     paths: u32,
+    /// True if splats are marked ([`marked`]).
+    is_marking: bool,
 }
 
 impl<'a, F: Features> LightPass<'a, F> {
@@ -70,12 +81,20 @@ impl<'a, F: Features> LightPass<'a, F> {
         counts: Counts,
         merging: Option<MergeRadii>,
     ) -> Self {
-        Self { context, emission, settings, counts, merging, paths: counts.light_paths as u32 }
+        Self {
+            context,
+            emission,
+            settings,
+            counts,
+            merging,
+            paths: counts.light_paths as u32,
+            is_marking: false,
+        }
     }
 
-    /// The same paths with the weights of other counts.
+    /// The same paths with the weights of other counts, and with marked splats ([`marked`]).
     pub fn weighted_by(self, counts: Counts, merging: Option<MergeRadii>) -> Self {
-        Self { counts, merging, ..self }
+        Self { counts, merging, is_marking: true, ..self }
     }
 
     /// Working memory of a task.
@@ -101,7 +120,7 @@ impl<'a, F: Features> LightPass<'a, F> {
         splats: &mut [Splat],
         output: &mut TaskOutput,
     ) -> Result<Counters, OutOfMemory> {
-        let Self { context, emission, settings, counts, merging, paths } = *self;
+        let Self { context, emission, settings, counts, merging, paths, is_marking } = *self;
         let mut arena = scratch.scratch();
         let mut writer = Writer {
             context,
@@ -109,6 +128,7 @@ impl<'a, F: Features> LightPass<'a, F> {
             settings,
             counts,
             merging,
+            is_marking,
             vertices,
             stored: 0,
             splats: arena.slice(VERTICES_PER_TASK)?,
@@ -146,6 +166,7 @@ struct Writer<'w, F> {
     settings: PathSettings,
     counts: Counts,
     merging: Option<MergeRadii>,
+    is_marking: bool,
     vertices: &'w mut [LightVertex],
     stored: usize,
     splats: &'w mut [Splat],
@@ -206,7 +227,7 @@ impl<F: Features> Writer<'_, F> {
             },
             ..LightVertex::default()
         }
-        .with_arrival(merge.and_then(|(_, arrival)| arrival));
+        .with_arrival(merge.and_then(|(_, arrival)| arrival), state.history.rest());
         self.stored += 1;
     }
 
@@ -249,7 +270,8 @@ impl<F: Features> Writer<'_, F> {
         }
         let ray = point.spawn_to(lens_point(camera, lens, point.position, &seen));
         let pixel = Tile::position([width, height], seen.raster.x as u32, seen.raster.y as u32) as u32;
-        self.shadows.rays[self.pending] = Ray { tag: pixel, ..ray };
+        let mark = if self.is_marking { state.history.rest().bits() << REST } else { 0 };
+        self.shadows.rays[self.pending] = Ray { tag: pixel | mark, ..ray };
         self.shadows.light[self.pending] = radiance.to_array();
         self.pending += 1;
         Some(())
@@ -309,6 +331,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
         }
         let cos_in = vertex.to_light.dot(vertex.point.geometric_normal).abs();
         state.sums = self.arrive(state, vertex, cos_in);
+        state.history = state.history.from_light(vertex.bsdf);
         if !vertex.bsdf.is_delta() {
             self.store(state, vertex, counters);
             if self.pending == SHADOW_RAYS {

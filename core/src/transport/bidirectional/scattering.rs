@@ -50,6 +50,9 @@ impl<F: Features> CameraPaths<'_, F> {
         path.sums = self.leave(vertex, &sample, (direction, towards));
         path.eta_vcm = if sample.delta { 0.0 } else { vertex.eta_vcm };
         path.has_rough |= u32::from(!bsdf.is_caustic_caster() && !sample.delta);
+        if sample.delta {
+            path.history = path.history.by_coat();
+        }
         path.throughput = throughput.to_array();
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
         path.position = point.position.to_array();

@@ -103,7 +103,8 @@ impl<F: Features> CameraPaths<'_, F> {
         }
         let weight = weight_of_light_sample(counts, &sums, (pdf, light.pdf), density, emitted);
         let radiance = Rgb::from(path.throughput) * value * light.radiance * (weight / light.pdf);
-        queue.push(Class::Paths, tag, shadow_ray(point, &light)?, radiance);
+        let rest = path.history.rest_of_sample();
+        queue.push((Class::Paths, rest), tag, shadow_ray(point, &light)?, radiance);
         Some(())
     }
 
@@ -130,7 +131,8 @@ impl<F: Features> CameraPaths<'_, F> {
         let each = self.connections.vertices.len() as f32 / self.connections.count as f32;
         for light in drawn {
             if let Some((ray, radiance)) = self.connection(path, vertex, light) {
-                queue.push(Class::Connections, tag, ray, radiance * each);
+                let rest = path.history.rest_of_connection(light.rest());
+                queue.push((Class::Connections, rest), tag, ray, radiance * each);
             }
         }
     }

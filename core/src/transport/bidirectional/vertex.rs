@@ -9,6 +9,7 @@ use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::arrival::Arrival;
 use crate::transport::bidirectional::mis::Sums;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::history::Rest;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -24,7 +25,7 @@ pub struct LightVertex {
     pub(super) power: [f32; 3],
     /// Segments of the path up to here.
     pub(super) segments: u16,
-    /// The way by which light comes to it, where it is merged.
+    /// The way by which light comes to it, where it is merged, and the rest that the light belongs to.
     pub(super) arrival: u16,
     /// Unit direction to the vertex before.
     pub(super) to_light: [f32; 3],
@@ -36,14 +37,20 @@ pub struct LightVertex {
 }
 
 impl LightVertex {
-    /// With an `arrival`.
-    pub(super) fn with_arrival(self, arrival: Option<Arrival>) -> Self {
-        Self { arrival: arrival.map_or(0, |arrival| 1 + arrival as u16), ..self }
+    /// With an `arrival` of light of a `rest`.
+    pub(super) fn with_arrival(self, arrival: Option<Arrival>, rest: Rest) -> Self {
+        let arrival = arrival.map_or(0, |arrival| 1 + arrival as u16);
+        Self { arrival: arrival | (rest.bits() as u16) << 8, ..self }
+    }
+
+    /// Records that do not supply the light which comes to the vertex.
+    pub(super) fn rest(&self) -> Rest {
+        Rest::from_bits(u32::from(self.arrival >> 8))
     }
 
     /// The way by which light comes to it; `None` where it is not merged.
     pub(super) fn arrival(&self) -> Option<Arrival> {
-        match self.arrival {
+        match self.arrival & 0xff {
             0 => None,
             1 => Some(Arrival::FromCaster),
             _ => Some(Arrival::FromNear),

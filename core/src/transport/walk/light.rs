@@ -16,6 +16,7 @@ use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
+use crate::transport::walk::history::History;
 use crate::transport::walk::sums::Sums;
 use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
 use bytemuck::{Pod, Zeroable};
@@ -67,6 +68,8 @@ pub(in crate::transport) struct LightPathState {
     pub path_pdfs: f32,
     /// 1 if the last surface is a caster: purely specular; for bidirectional paths, also narrow gloss.
     pub from_caster: u32,
+    /// Rough vertices of a bidirectional path, for its pilot.
+    pub history: History,
     /// Product of the continuation probabilities so far.
     survived: f32,
 }

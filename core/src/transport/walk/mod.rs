@@ -3,6 +3,7 @@
 
 pub(in crate::transport) mod context;
 pub(in crate::transport) mod dimension;
+pub(in crate::transport) mod history;
 pub(in crate::transport) mod light;
 pub(in crate::transport) mod mis;
 pub(in crate::transport) mod path_classes;

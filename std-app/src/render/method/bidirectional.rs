@@ -9,7 +9,7 @@ use crate::render::threads::Threads;
 use halflight_core::bsdf::Features;
 use halflight_core::method::Method as _;
 use halflight_core::method::bidirectional::{Bidirectional, BidirectionalSettings};
-use halflight_core::method::counts::{self, Choice};
+use halflight_core::method::counts::{self, Choice, pilot};
 
 /// Sets up the method of `plan`, or path tracing with all of its means where that has less noise for the
 /// work.
@@ -33,7 +33,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
         let techniques = choice.settings(&given, &setup.context());
         return Ok(Attempt::Ready(light_paths_with::<F>(&techniques, setup, memory, method)?));
     }
-    match choose::<F>(setup, memory, &given)? {
+    match choose::<F>(setup, memory, (&given, pilot::PART))? {
         None => Ok(Attempt::Ready(light_paths_with::<F>(&given, setup, memory, method)?)),
         Some(choice) if choice.gain.is_none() && choice.counts.light_paths > 0.0 => {
             Ok(Attempt::Instead(Plan::with_counts(method, choice).into()))
@@ -78,11 +78,12 @@ fn light_paths_with<'a: 'm, 'm, F: Features>(
     })
 }
 
-/// The counts that suit the picture, where `given` leaves them open.
+/// The counts that suit the picture, where `given` leaves them open, by a pilot with one pixel for each
+/// `part` of the picture.
 pub(super) fn choose<F: Features>(
     setup: &RenderSetup,
     memory: &mut Memory,
-    given: &BidirectionalSettings,
+    (given, part): (&BidirectionalSettings, usize),
 ) -> Result<Option<Choice>, RenderError> {
     let workers = setup.workers;
     let scratch = counts::scratch::<F>();
@@ -93,7 +94,7 @@ pub(super) fn choose<F: Features>(
     let mut own = memory.within(&bank);
     let mut scratch = own.take_each("pilot paths", scratch, workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);
-    let choice = counts::choose::<F>(&setup.context(), given, &mut own, &mut executor)?;
+    let choice = counts::choose::<F>(&setup.context(), (given, part), &mut own, &mut executor)?;
     memory.release(&own);
     Ok(choice)
 }

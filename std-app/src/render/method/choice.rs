@@ -42,7 +42,7 @@ pub(super) fn choose<'a, F: Features>(
     let techniques = BidirectionalSettings { merging, ..settings.bidirectional };
     let is_audited = settings.audit.is_none_or(|share| share > 0.0);
     let light_paths = match trial.affords_light_paths(&goal) {
-        true => bidirectional::choose::<F>(setup, memory, &techniques)?,
+        true => bidirectional::choose::<F>(setup, memory, (&techniques, trial.part_of_pilot(&goal)))?,
         false => None,
     };
     let findings = paths.findings();
@@ -50,7 +50,8 @@ pub(super) fn choose<'a, F: Features>(
     let light_paths = light_paths.filter(|choice| is_audited || !choice.counts.merging);
     let products = light_paths.and_then(|choice| choice.products(&findings));
     let light_paths = light_paths.map(|choice| choice.beside(&findings));
-    let products = products.filter(|_| light_paths.is_some_and(|choice| choice.counts.light_paths > 0.0));
+    let is_choice = light_paths.is_some_and(|choice| choice.counts.light_paths > 0.0);
+    let products = products.map(|found| if is_choice { found } else { found.of_others() });
     let (best, finding) = trial.best(&goal, is_audited && may_have_cache(setup), products);
     let instead = match (best, light_paths) {
         (Best::Paths, _) | (Best::LightPaths, None) => None,

@@ -1,15 +1,23 @@
 //! Sums of the pilot over blocks of pixels: noise and work of all candidates.
 
-use super::{BLOCK, Block, CONNECTIONS, Found, LEAST_VARIANCE, LIST, PART, Pilot, WEIGHTINGS, Weighting};
+use super::{BLOCK, Block, CONNECTIONS, Found, LEAST_VARIANCE, LIST, Pilot, SAMPLE, WEIGHTINGS, Weighting};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::PIXELS_PER_TILE;
-use crate::method::counts::prediction::{CANDIDATES, Reweighted, Weighed, Work};
+use crate::method::counts::prediction::{CANDIDATES, Candidate, Reweighted, Weighed, Work};
 use crate::transport::Counters;
-use crate::transport::bidirectional::contribution::{Class, Contribution};
-use crate::transport::bidirectional::light_pass::PATHS_PER_TASK;
+use crate::transport::bidirectional::contribution::{Class, Contribution, Rest};
+use crate::transport::bidirectional::light_pass::{PATHS_PER_TASK, marked};
 
 impl<F: Features> Pilot<'_, '_, F> {
+    /// Counts of each of the [`super::WAYS`], and the light that it finds.
+    fn ways(&self) -> impl Iterator<Item = (Candidate, fn(Rest) -> bool)> {
+        let all: fn(Rest) -> bool = |_| true;
+        let candidates = self.candidates.iter().map(move |candidate| (*candidate, all));
+        let rests = [Rest::is_beside_irradiance as fn(Rest) -> bool, Rest::is_beside_lobes];
+        candidates.chain(rests.map(|is_found| (Candidate::PATHS, is_found)))
+    }
+
     /// Adds camera paths of a sample to the `blocks` and sums of their tile. The variance is that of pairs
     /// of samples, except that the squares of contributions are those expected. Those of merges stay as
     /// they are: the photons of a disc are no independent samples.
@@ -22,18 +30,19 @@ impl<F: Features> Pilot<'_, '_, F> {
         let sign = if sample == 0 { 1.0 } else { -1.0 };
         for weighed in weighed {
             let block = &mut blocks[weighed.place() / BLOCK];
-            block.light += PART * weighed.value();
-            block.merged += if weighed.is_merge() { PART * weighed.value() } else { 0.0 };
+            block.light += SAMPLE * weighed.value();
+            block.merged += if weighed.is_merge() { SAMPLE * weighed.value() } else { 0.0 };
         }
-        for (i, (candidate, sums)) in self.candidates.iter().zip(sums.chunks_mut(PIXELS_PER_TILE)).enumerate()
+        for (i, ((candidate, is_found), sums)) in
+            self.ways().zip(sums.chunks_mut(PIXELS_PER_TILE)).enumerate()
         {
             let ratios = candidate.ratios(&self.counts);
-            for weighed in weighed {
+            for weighed in weighed.iter().filter(|weighed| is_found(weighed.rest())) {
                 let Reweighted { value, square } = weighed.with(&ratios);
                 let block = &mut blocks[weighed.place() / BLOCK];
                 let is_sum = weighed.is_merge() && candidate.merging;
-                block.variance[i] += if is_sum { 0.0 } else { PART * (square - value * value) };
-                block.square[i] += PART * square;
+                block.variance[i] += if is_sum { 0.0 } else { SAMPLE * (square - value * value) };
+                block.square[i] += SAMPLE * square;
                 sums[weighed.place()] += sign * value;
             }
         }
@@ -48,7 +57,8 @@ impl<F: Features> Pilot<'_, '_, F> {
         blocks: &mut [Block],
     ) {
         let splat = weightings[0].splats[index];
-        let place = (splat.pixel as usize).wrapping_sub(tile * PIXELS_PER_TILE);
+        let (pixel, rest) = marked(splat.pixel);
+        let place = (pixel as usize).wrapping_sub(tile * PIXELS_PER_TILE);
         if place >= PIXELS_PER_TILE {
             return;
         }
@@ -60,11 +70,12 @@ impl<F: Features> Pilot<'_, '_, F> {
         let (Some(base), Some(a), Some(b), Some(c)) = (value(0), value(1), value(2), value(3)) else {
             return;
         };
-        let weighed = Weighed::new(Contribution::new(Class::Splats, place as u32, base), [a, b, c]);
+        let contribution = Contribution::new(Class::Splats, place as u32, base).with_rest(rest);
+        let weighed = Weighed::new(contribution, [a, b, c]);
         let block = &mut blocks[place / BLOCK];
-        block.light += PART * base;
-        for (i, candidate) in self.candidates.iter().enumerate() {
-            let square = PART * weighed.with(&candidate.ratios(&self.counts)).square;
+        block.light += SAMPLE * base;
+        for (i, (candidate, _)) in self.ways().enumerate().filter(|(_, (_, is_found))| is_found(rest)) {
+            let square = SAMPLE * weighed.with(&candidate.ratios(&self.counts)).square;
             block.variance[i] += square;
             block.square[i] += square;
         }
@@ -79,15 +90,15 @@ impl<F: Features> Pilot<'_, '_, F> {
             let scale = level * level + 0.01 * mean * mean;
             if block.pixels > 0.0 && scale > 0.0 { 1.0 / (pixels * scale) } else { 0.0 }
         };
-        let mut noise = [0.0; CANDIDATES];
-        for (i, noise) in noise.iter_mut().enumerate() {
-            let variance = of(&|block| relative(block) * block.variance[i]);
-            let square = of(&|block| relative(block) * block.square[i]);
-            *noise = variance.max(LEAST_VARIANCE * square);
-        }
-        let samples = pixels / PART;
+        let noise_of = |way: usize| {
+            let variance = of(&|block| relative(block) * block.variance[way]);
+            let square = of(&|block| relative(block) * block.square[way]);
+            variance.max(LEAST_VARIANCE * square)
+        };
+        let noise = core::array::from_fn(noise_of);
+        let samples = pixels / SAMPLE;
         let connections = of(&|block| block.connections);
-        let light_paths = (self.tasks * PATHS_PER_TASK) as f32 / PART;
+        let light_paths = (self.tasks * PATHS_PER_TASK) as f32 / SAMPLE;
         let work = Work {
             camera_rays: camera.rays as f32 / samples,
             light_samples: (camera.shadow_rays as f32 - connections).max(0.0) / samples,
@@ -96,7 +107,7 @@ impl<F: Features> Pilot<'_, '_, F> {
             splats: light.shadow_rays as f32 / light_paths,
         };
         let merged = of(&|block| block.merged) / of(&|block| block.light).max(f32::MIN_POSITIVE);
-        Found { noise, work, merged }
+        Found { noise, noise_of_rest: core::array::from_fn(|i| noise_of(CANDIDATES + i)), work, merged }
     }
 }
 
