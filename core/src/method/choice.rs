@@ -157,6 +157,8 @@ struct Predictions {
     paths: f64,
     /// Noise of a sample of all light, and of that which no record supplies, for each of [`SUPPLIES`].
     noise: [f64; SUPPLIES],
+    /// Error of a picture without the rare light that no path would find, 0 if there is none.
+    missing: f64,
     light_paths: f64,
 }
 
@@ -276,13 +278,15 @@ impl Trial {
         // Rare light is that of records or of the rest; the picture lacks a rest that no path would find.
         let [first, second] = light_paths.and_then(|pilot| pilot.of_rest).unwrap_or_default();
         let of_rest = [0.0, first, second];
-        let noise = core::array::from_fn(|i| match of_rest[i] * self.work[i] < ALL_IS_MISSING * work {
-            true if i > 0 => of_rest[i].max(factor * self.noise[i]),
-            _ => self.noise[i] * paths / of_trial,
+        let is_missing = |i: usize| of_rest[i] * self.work[i] >= ALL_IS_MISSING * work;
+        let noise = core::array::from_fn(|i| match i == 0 || is_missing(i) {
+            true => self.noise[i] * paths / of_trial,
+            false => of_rest[i].max(factor * self.noise[i]),
         });
         Predictions {
             paths,
             noise,
+            missing: if is_missing(IRRADIANCE) { ALL_IS_MISSING } else { 0.0 },
             light_paths: light_paths.map_or(f64::INFINITY, |pilot| LIGHT_PATHS_FACTOR * pilot.product / work),
         }
     }
@@ -316,7 +320,7 @@ impl Trial {
             return (Best::Paths, Finding::new("method", Used, "paths show no noise"));
         }
         let work = self.budget(goal);
-        let Predictions { paths, noise, light_paths } = self.predict(work, light_paths);
+        let Predictions { paths, noise, missing, light_paths } = self.predict(work, light_paths);
         let [(first, cache), (second, radiance_cache)] =
             [(IRRADIANCE, may_have_cache), (RADIANCE, may_have_cache && self.has_lobes)].map(
                 |(supply, is_choice)| {
@@ -329,10 +333,10 @@ impl Trial {
             () if paths <= LEAST_GAIN * cached.min(light_paths) => {
                 (Best::Paths, "path tracing has the least error")
             }
-            () if cached <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
+            () if cached.max(missing) <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
                 (Best::Cache(first), "an irradiance cache has less error than path tracing")
             }
-            () if cached <= light_paths => {
+            () if cached.max(missing) <= light_paths => {
                 (Best::RadianceCache(second), "records of rough reflections have less error than paths")
             }
             () => (Best::LightPaths, "light paths have less error than paths alone"),

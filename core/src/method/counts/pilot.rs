@@ -52,7 +52,7 @@ const BLOCK: usize = 64;
 const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
 /// Ways to find light: by the counts of each candidate, and by path tracing the rest beside records of
-/// irradiance, and beside those of lobes ([`Rest`]).
+/// irradiance, and beside those of lobes.
 const WAYS: usize = CANDIDATES + RESTS;
 const RESTS: usize = 2;
 

@@ -315,7 +315,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return None;
         }
         let bsdf = self.context.bsdf_at(&point);
-        path.history = path.history.from_camera(&bsdf);
+        path.history = path.history.on_camera_path(&bsdf);
         let wo = point.frame.to_local(-direction);
         let is_bent = is_bent(&point, wo);
         let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, &bsdf, direction) };

@@ -331,7 +331,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
         }
         let cos_in = vertex.to_light.dot(vertex.point.geometric_normal).abs();
         state.sums = self.arrive(state, vertex, cos_in);
-        state.history = state.history.from_light(vertex.bsdf);
+        state.history = state.history.on_light_path(vertex.bsdf);
         if !vertex.bsdf.is_delta() {
             self.store(state, vertex, counters);
             if self.pending == SHADOW_RAYS {

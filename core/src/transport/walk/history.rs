@@ -89,7 +89,7 @@ impl History {
     }
 
     /// Camera subpath with a vertex at `bsdf`.
-    pub(in crate::transport) fn from_camera(self, bsdf: &Bsdf) -> Self {
+    pub(in crate::transport) fn on_camera_path(self, bsdf: &Bsdf) -> Self {
         self.with(bsdf, self.of_last())
     }
 
@@ -99,7 +99,7 @@ impl History {
     }
 
     /// Light subpath with a vertex at `bsdf`.
-    pub(in crate::transport) fn from_light(self, bsdf: &Bsdf) -> Self {
+    pub(in crate::transport) fn on_light_path(self, bsdf: &Bsdf) -> Self {
         let next = self.with(bsdf, 0);
         if self.has(LAST_IS_ROUGH) { Self(next.0 | next.of_last()) } else { next }
     }
@@ -147,11 +147,11 @@ mod tests {
     }
 
     fn camera(path: &[Bsdf]) -> History {
-        path.iter().fold(History::default(), |history, bsdf| history.from_camera(bsdf))
+        path.iter().fold(History::default(), |history, bsdf| history.on_camera_path(bsdf))
     }
 
     fn light(path: &[Bsdf]) -> History {
-        path.iter().fold(History::default(), |history, bsdf| history.from_light(bsdf))
+        path.iter().fold(History::default(), |history, bsdf| history.on_light_path(bsdf))
     }
 
     #[test]
