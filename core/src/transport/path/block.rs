@@ -4,7 +4,7 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, Diffuse, Features};
 use crate::geometry::Frame;
 use crate::light::LightSample;
-use crate::scene::{Material, SurfacePoint};
+use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::walk::termination::TRAPPED_FROM;
 use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
@@ -17,6 +17,7 @@ use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
 use halflight_simd::kernels::shade::sky::SkyBlock;
 use halflight_simd::kernels::shade::specular::SpecularBlock;
 use halflight_simd::kernels::shade::surface::SurfaceBlock;
+use halflight_simd::kernels::shade::texture::TextureBlock;
 use halflight_simd::kernels::shade::{Row, Row3, at, put};
 
 /// Inputs and results of the kernels, and parts of the vertices that only loops use. Rows of vertices that a
@@ -57,6 +58,10 @@ pub(super) struct Block<'a> {
     pub(super) triangle: [u32; BLOCK],
     pub(super) material: [&'a Material; BLOCK],
     pub(super) uv: [Vec2; BLOCK],
+    pub(super) textures: TextureBlock,
+    /// Set of vertices whose colours were looked up in lanes, and their texels.
+    pub(super) textured: u32,
+    pub(super) texel: Row3,
     /// BSDFs that lanes do not sample, and coats.
     pub(super) others: [Bsdf; BLOCK],
     /// First triangles of the sampled area lights.
@@ -142,10 +147,22 @@ impl<'a> Block<'a> {
             triangle: [0; BLOCK],
             material: [&GREY; BLOCK],
             uv: [Vec2::ZERO; BLOCK],
+            textures: TextureBlock::EMPTY,
+            textured: 0,
+            texel: [[0.0; BLOCK]; 3],
             others: [Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }); BLOCK],
             lamp: [0; BLOCK],
             is_lone: false,
         }
+    }
+
+    /// BSDF of vertex `i`.
+    #[inline]
+    pub(super) fn bsdf_at<F: Features>(&self, scene: &Scene, i: usize) -> Bsdf {
+        let i = i & 15;
+        let texel = (F::TEXTURES && self.textured >> i & 1 == 1).then(|| Rgb::from(at(&self.texel, i)));
+        let front = self.surface.front >> i & 1 == 1;
+        Bsdf::of_texel::<F>((scene, self.material[i]), texel, self.uv[i], front)
     }
 
     /// Set of the vertices whose BSDFs lanes sample.

@@ -18,6 +18,7 @@ pub mod scatter;
 pub mod sky;
 pub mod specular;
 pub mod surface;
+pub mod texture;
 pub mod triangle;
 pub mod vector;
 pub mod warp;

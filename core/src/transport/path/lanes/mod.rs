@@ -14,10 +14,10 @@ use super::block::{Block, Set, Stages};
 use super::estimator::{LightEstimator, PathVertex, RemainingLight};
 use super::shade::{Path, Shading};
 use super::sharing::{PathMemory, Sharing};
-use crate::bsdf::{Bsdf, COATS, Features};
+use crate::bsdf::{COATS, Features};
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
-use crate::scene::SurfacePoint;
+use crate::scene::{SurfacePoint, load};
 use crate::transport::settings::Counters;
 use crate::transport::walk::dimension;
 use crate::transport::wavefront::{BLOCK, Wavefront};
@@ -135,9 +135,10 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             put(&mut block.corners[1], i, b);
             put(&mut block.corners[2], i, c);
             if !mesh.normals.is_empty() {
-                for (rows, vertex) in block.normals.iter_mut().zip(triangle.vertices) {
-                    put(rows, i, mesh.normals.get(vertex as usize).copied().unwrap_or_default());
-                }
+                let normal = |vertex: u32| mesh.normals.get(vertex as usize).copied().unwrap_or_default();
+                put(&mut block.normals[0], i, normal(triangle.vertices[0]));
+                put(&mut block.normals[1], i, normal(triangle.vertices[1]));
+                put(&mut block.normals[2], i, normal(triangle.vertices[2]));
             }
             (block.weights[0][i], block.weights[1][i]) = (hit.u, hit.v);
             block.eta_squared[i] = path.eta_squared;
@@ -170,6 +171,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let mapped = |i: &usize| block.material[*i].normal_map.is_some();
             special |= Set(hits).filter(mapped).fold(0, |set, i| set | 1 << i);
         }
+        self.look_up_colors(block, hits);
         for i in Set(special) {
             let (ray, hit) = (wave.rays[first + i], wave.hits[first + i]);
             match self.context.surface_at(&ray, &hit) {
@@ -178,6 +180,30 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             }
         }
         met
+    }
+
+    /// Looks up the textures of the colours at the `hits`. Their accesses to memory overlap.
+    #[inline]
+    fn look_up_colors(&self, block: &mut Block<'a>, hits: u32) {
+        let scene = self.context.scene;
+        block.textured = 0;
+        if !F::TEXTURES || scene.textures.is_empty() {
+            return;
+        }
+        let mut texels: [(&[[u8; 4]], usize); BLOCK] = [(&[], 0); BLOCK];
+        for i in Set(hits) {
+            let id = block.material[i].surface.color().and_then(|color| color.texture);
+            let Some(texture) = id.and_then(|id| scene.textures.get(id.0 as usize)) else { continue };
+            if let Some(found) = texture.put(&mut block.textures, i, block.uv[i]) {
+                texels[i] = found;
+                block.textured |= 1 << i;
+            }
+        }
+        if block.textured != 0 {
+            block.textures.surround(self.context.level);
+            Set(block.textured).for_each(|i| load(&mut block.textures, i, texels[i]));
+            block.textures.mix(self.context.level, &mut block.texel);
+        }
     }
 
     /// Adds emission at the `hits`, whose rays start at `first`, continues behind skipped surfaces, looks up
@@ -198,15 +224,21 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let index = block.path[i] as usize;
             let Some(mut path) = memory.path(wave.paths, index, &mut none) else { continue };
             let ray = wave.rays[first + i];
-            let bsdf = match self.arrive_at(block, i, &mut path, (&ray, &wave.hits[first + i]), counters) {
-                Ok(bsdf) => bsdf,
-                Err(Some(through)) => {
-                    // At most in place of this ray: later ones are still read.
-                    wave.push_ray(index, through);
-                    continue;
-                }
-                Err(None) => continue,
+            let hit = (&ray, &wave.hits[first + i]);
+            if let Err(next) = self.arrive_at(block, i, &mut path, hit, counters) {
+                // At most in place of this ray: later ones are still read.
+                next.into_iter().for_each(|through| wave.push_ray(index, through));
+                continue;
+            }
+            // Not copied: a copy would wait for its fields to be written.
+            let bsdf = block.bsdf_at::<F>(self.context.scene, i);
+            let entered = !path.path.classes.ends_at(&bsdf) && {
+                let Path { path, state, shared } = &mut path;
+                self.enter((path, state, shared), &block.point(i), &bsdf).is_ok()
             };
+            if !entered {
+                continue;
+            }
             put(&mut block.throughput, i, path.path.throughput);
             let one = 1 << i;
             if E::ADDS_NOTHING {
@@ -241,17 +273,17 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         stages
     }
 
-    /// Adds emission at vertex `i`, the `hit` of `ray`, and looks up its BSDF. `Err` if the path does not
-    /// scatter there: the next ray behind a skipped surface, or `None` if the path ends.
+    /// Adds emission at vertex `i`, the `hit` of `ray`. `Err` if the path does not scatter there: the next ray
+    /// behind a skipped surface, or `None` if the path ends.
     #[inline]
     fn arrive_at(
         &self,
         block: &Block<'a>,
         i: usize,
-        Path { path, state, shared }: &mut Path<E::State, R::State>,
+        Path { path, state, .. }: &mut Path<E::State, R::State>,
         (ray, hit): (&Ray, &Hit),
         counters: &mut Counters,
-    ) -> Result<Bsdf, Option<Ray>> {
+    ) -> Result<(), Option<Ray>> {
         let (segments, triangle) = (block.segments[i], block.triangle[i]);
         let (material, front) = (block.material[i], block.surface.front >> i & 1 == 1);
         let is_cutout = F::CUTOUT && material.has_cutout();
@@ -269,14 +301,6 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         if material.emits() {
             self.emission(path, state, &block.point(i), ray.direction.into());
         }
-        if segments >= self.settings.max_depth {
-            return Err(None);
-        }
-        let bsdf = Bsdf::at::<F>(self.context.scene, material, block.uv[i], front);
-        if path.classes.ends_at(&bsdf) {
-            return Err(None);
-        }
-        self.enter((path, state, shared), &block.point(i), &bsdf)?;
-        Ok(bsdf)
+        if segments >= self.settings.max_depth { Err(None) } else { Ok(()) }
     }
 }

@@ -1,0 +1,138 @@
+//! Bilinear look-ups of textures at the vertices of a block, over lanes: the texels around the texture
+//! coordinates, and their mixture. The caller loads the texels in between.
+
+use super::vector::{self, add, scale};
+use super::{Row, Row3, at, load3, put};
+use crate::lanes::{Lanes, Simd};
+use crate::level::{Kernel, Level};
+
+/// Largest number of texels across and down: one of its halves is a float.
+pub const MAX_SIZE: u32 = 1 << 22;
+
+/// Coordinates of this size and larger are whole numbers.
+const WHOLE: f32 = 8_388_608.0;
+
+/// Texture look-ups of a block.
+#[derive(Clone, Debug)]
+pub struct TextureBlock {
+    /// Coordinates across and down; 0 … 1 spans the texture.
+    pub at: [Row; 2],
+    /// Numbers of texels across and down, 1 … [`MAX_SIZE`].
+    pub size: [Row; 2],
+    /// Bit `i`: look-up `i` extends the border. Others repeat the texture.
+    pub clamps: u32,
+    /// Column and row of the upper left texel, by [`TextureBlock::surround`].
+    pub first: [Row; 2],
+    /// Column and row of the lower right texel.
+    pub second: [Row; 2],
+    /// Weights of the second column and row.
+    pub weight: [Row; 2],
+    /// Linear texels: upper left, upper right, lower left, lower right.
+    pub texels: [Row3; 4],
+}
+
+impl TextureBlock {
+    /// Textures of one black texel.
+    pub const EMPTY: Self = Self {
+        at: [[0.0; 16]; 2],
+        size: [[1.0; 16]; 2],
+        clamps: 0,
+        first: [[0.0; 16]; 2],
+        second: [[0.0; 16]; 2],
+        weight: [[0.0; 16]; 2],
+        texels: [[[0.0; 16]; 3]; 4],
+    };
+
+    /// Computes the places and weights of the texels by the instructions of `level`.
+    pub fn surround(&mut self, level: Level) {
+        level.dispatch(SurroundKernel(self));
+    }
+
+    /// Scalar reference; equals [`TextureBlock::surround`] to the bit.
+    pub fn surround_reference(&mut self) {
+        for axis in 0..2 {
+            for i in 0..super::BLOCK {
+                let around = surround(self.at[axis][i], self.size[axis][i], self.clamps >> i & 1 == 1);
+                [self.first[axis][i], self.second[axis][i], self.weight[axis][i]] = around;
+            }
+        }
+    }
+
+    /// Mixtures of the texels by the instructions of `level`.
+    pub fn mix(&self, level: Level, mixture: &mut Row3) {
+        level.dispatch(MixKernel(self, mixture));
+    }
+
+    /// Scalar reference; equals [`TextureBlock::mix`] to the bit.
+    pub fn mix_reference(&self, mixture: &mut Row3) {
+        for i in 0..super::BLOCK {
+            let [a, b, c, d] = &self.texels;
+            let texels = [at(a, i), at(b, i), at(c, i), at(d, i)];
+            put(mixture, i, mix(texels, [self.weight[0][i], self.weight[1][i]]));
+        }
+    }
+}
+
+/// Floor of `x`, for |x| < [`WHOLE`].
+#[inline(always)]
+fn floor<L: Lanes>(x: L) -> L {
+    // Rounded to an integer by the steps of f32 from 2^23 on.
+    let large = x.all(WHOLE).copysign(x);
+    let rounded = (x + large) - large;
+    (rounded - x.all(1.0)).select(x.lt(rounded), rounded)
+}
+
+/// The two texels around coordinate `x`, among `size`, and the weight of the second.
+#[inline(always)]
+fn surround<L: Lanes>(x: L, size: L, clamps: L::Mask) -> [L; 3] {
+    let (zero, one) = (x.all(0.0), x.all(1.0));
+    // False for NaN as well.
+    let x = x.select(x.abs().lt(x.all(WHOLE)), zero);
+    let last = size - one;
+    let texel = x.max(zero).min(one).select(clamps, x - floor(x)) * size - x.all(0.5);
+    let texel = texel.max(zero).min(last).select(clamps, texel);
+    let below = floor(texel);
+    let first = last.select(below.lt(zero), below.min(last));
+    let second = last.select(clamps, zero).select(first.eq(last), first + one);
+    [first, second, texel - below]
+}
+
+/// Mixture of four texels.
+#[inline(always)]
+fn mix<L: Lanes>([a, b, c, d]: [[L; 3]; 4], [x, y]: [L; 2]) -> [L; 3] {
+    let lerp = |a, b, t: L| add(scale(a, t.all(1.0) - t), scale(b, t));
+    lerp(lerp(a, b, x), lerp(c, d, x), y)
+}
+
+struct SurroundKernel<'k>(&'k mut TextureBlock);
+
+impl Kernel for SurroundKernel<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let block = self.0;
+        let clamps = simd.mask16(block.clamps);
+        for axis in 0..2 {
+            let (x, size) = (simd.load16(&block.at[axis]), simd.load16(&block.size[axis]));
+            let [first, second, weight] = surround(x, size, clamps);
+            block.first[axis] = first.to_array();
+            block.second[axis] = second.to_array();
+            block.weight[axis] = weight.to_array();
+        }
+    }
+}
+
+struct MixKernel<'k>(&'k TextureBlock, &'k mut Row3);
+
+impl Kernel for MixKernel<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self(TextureBlock { texels: [a, b, c, d], weight, .. }, mixture) = self;
+        let texels = [load3(simd, a), load3(simd, b), load3(simd, c), load3(simd, d)];
+        let weights = [simd.load16(&weight[0]), simd.load16(&weight[1])];
+        *mixture = vector::to_arrays(mix(texels, weights));
+    }
+}
