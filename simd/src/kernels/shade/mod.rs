@@ -12,6 +12,7 @@ pub mod direct;
 pub mod emitter;
 mod fresnel;
 pub mod ggx;
+mod load;
 pub mod numbers;
 pub mod rectangle;
 pub mod scatter;

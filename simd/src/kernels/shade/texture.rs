@@ -1,8 +1,9 @@
 //! Bilinear look-ups of textures at the vertices of a block, over lanes: the texels around the texture
 //! coordinates, and their mixture. The caller loads the texels in between.
 
+use super::load::{All, Load, One};
 use super::vector::{self, add, scale};
-use super::{Row, Row3, at, load3, put};
+use super::{Row, Row3, put};
 use crate::lanes::{Lanes, Simd};
 use crate::level::{Kernel, Level};
 
@@ -43,6 +44,12 @@ impl TextureBlock {
         texels: [[[0.0; 16]; 3]; 4],
     };
 
+    /// Texels and weights along one axis over lanes.
+    #[inline(always)]
+    fn around<F: Load>(&self, from: F, axis: usize) -> [F::Lanes; 3] {
+        surround(from.row(&self.at[axis]), from.row(&self.size[axis]), from.set(self.clamps))
+    }
+
     /// Computes the places and weights of the texels by the instructions of `level`.
     pub fn surround(&mut self, level: Level) {
         level.dispatch(SurroundKernel(self));
@@ -52,10 +59,17 @@ impl TextureBlock {
     pub fn surround_reference(&mut self) {
         for axis in 0..2 {
             for i in 0..super::BLOCK {
-                let around = surround(self.at[axis][i], self.size[axis][i], self.clamps >> i & 1 == 1);
-                [self.first[axis][i], self.second[axis][i], self.weight[axis][i]] = around;
+                [self.first[axis][i], self.second[axis][i], self.weight[axis][i]] = self.around(One(i), axis);
             }
         }
+    }
+
+    /// Mixtures of the texels over lanes.
+    #[inline(always)]
+    fn mixture<F: Load>(&self, from: F) -> [F::Lanes; 3] {
+        let [a, b, c, d] = &self.texels;
+        let texels = [from.row3(a), from.row3(b), from.row3(c), from.row3(d)];
+        mix(texels, [from.row(&self.weight[0]), from.row(&self.weight[1])])
     }
 
     /// Mixtures of the texels by the instructions of `level`.
@@ -66,9 +80,7 @@ impl TextureBlock {
     /// Scalar reference; equals [`TextureBlock::mix`] to the bit.
     pub fn mix_reference(&self, mixture: &mut Row3) {
         for i in 0..super::BLOCK {
-            let [a, b, c, d] = &self.texels;
-            let texels = [at(a, i), at(b, i), at(c, i), at(d, i)];
-            put(mixture, i, mix(texels, [self.weight[0][i], self.weight[1][i]]));
+            put(mixture, i, self.mixture(One(i)));
         }
     }
 }
@@ -112,10 +124,8 @@ impl Kernel for SurroundKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let block = self.0;
-        let clamps = simd.mask16(block.clamps);
         for axis in 0..2 {
-            let (x, size) = (simd.load16(&block.at[axis]), simd.load16(&block.size[axis]));
-            let [first, second, weight] = surround(x, size, clamps);
+            let [first, second, weight] = block.around(All(simd), axis);
             block.first[axis] = first.to_array();
             block.second[axis] = second.to_array();
             block.weight[axis] = weight.to_array();
@@ -130,9 +140,6 @@ impl Kernel for MixKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self(TextureBlock { texels: [a, b, c, d], weight, .. }, mixture) = self;
-        let texels = [load3(simd, a), load3(simd, b), load3(simd, c), load3(simd, d)];
-        let weights = [simd.load16(&weight[0]), simd.load16(&weight[1])];
-        *mixture = vector::to_arrays(mix(texels, weights));
+        *self.1 = vector::to_arrays(self.0.mixture(All(simd)));
     }
 }
