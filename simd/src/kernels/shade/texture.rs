@@ -112,8 +112,12 @@ fn surround<L: Lanes>(x: L, size: L, clamps: L::Mask) -> [L; 3] {
 /// Mixture of four texels.
 #[inline(always)]
 fn mix<L: Lanes>([a, b, c, d]: [[L; 3]; 4], [x, y]: [L; 2]) -> [L; 3] {
-    let lerp = |a, b, t: L| add(scale(a, t.all(1.0) - t), scale(b, t));
     lerp(lerp(a, b, x), lerp(c, d, x), y)
+}
+
+#[inline(always)]
+fn lerp<L: Lanes>(a: [L; 3], b: [L; 3], t: L) -> [L; 3] {
+    add(scale(a, t.all(1.0) - t), scale(b, t))
 }
 
 struct SurroundKernel<'k>(&'k mut TextureBlock);

@@ -80,6 +80,7 @@ struct Block {
     given: ScatterBlock,
     ones: Row3,
     raster: [Row; 2],
+    textures: TextureBlock,
 }
 
 impl Block {
@@ -158,6 +159,13 @@ impl Block {
             ..SpecularBlock::EMPTY
         };
         let raster = [row(0.0, 640.0), row(0.0, 480.0)];
+        let textures = TextureBlock {
+            at: weights,
+            size: [[512.0; 16]; 2],
+            weight: weights,
+            texels: [corners[0], corners[1], corners[2], ways],
+            ..TextureBlock::EMPTY
+        };
         Self {
             corners,
             weights,
@@ -173,6 +181,7 @@ impl Block {
             given: ScatterBlock::EMPTY,
             ones: [[1.0; 16]; 3],
             raster,
+            textures,
         }
     }
 
@@ -228,7 +237,7 @@ impl Block {
     }
 
     fn surround(&self, level: Option<Level>) {
-        let mut block = TextureBlock { at: self.weights, size: [[512.0; 16]; 2], ..TextureBlock::EMPTY };
+        let mut block = self.textures.clone();
         match level {
             None => block.surround_reference(),
             Some(level) => block.surround(level),
@@ -237,12 +246,10 @@ impl Block {
     }
 
     fn mix(&self, level: Option<Level>) {
-        let texels = [self.ones; 4];
-        let block = TextureBlock { texels, weight: self.weights, ..TextureBlock::EMPTY };
         let mut mixture = self.ones;
         match level {
-            None => block.mix_reference(&mut mixture),
-            Some(level) => block.mix(level, &mut mixture),
+            None => self.textures.mix_reference(&mut mixture),
+            Some(level) => self.textures.mix(level, &mut mixture),
         }
         black_box(&mixture);
     }

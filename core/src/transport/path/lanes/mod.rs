@@ -189,8 +189,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         stages
     }
 
-    /// Adds emission at vertex `i`, the `hit` of `ray`. `Err` if the path does not scatter there: the next ray
-    /// behind a skipped surface, or `None` if the path ends.
+    /// Adds emission at vertex `i`, the `hit` of `ray`. `Err` if the path does not scatter there: the next
+    /// ray behind a skipped surface, or `None` if the path ends.
     #[inline]
     fn arrive_at(
         &self,
