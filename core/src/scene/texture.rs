@@ -227,6 +227,9 @@ const fn power_12_5(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Level;
+    use crate::sampling::Random;
+    use halflight_simd::kernels::shade::at;
 
     const IDENTITY: TextureTransform = TextureTransform::IDENTITY;
     const RGBW: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
@@ -286,6 +289,33 @@ mod tests {
         for uv in [Vec2::ZERO, Vec2::new(0.125, 0.75), Vec2::new(-3.375, 0.0625)] {
             assert_eq!(moved.lookup(uv), plain.lookup(scale * uv + offset));
             assert_eq!(moved.gradient(uv), plain.gradient(scale * uv + offset));
+        }
+    }
+
+    #[test]
+    fn look_ups_of_a_block_have_the_bits_of_single_ones() {
+        let texels: [[u8; 4]; 15] = core::array::from_fn(|i| [17 * i as u8, 90 + 11 * i as u8, i as u8, 0]);
+        let transform = TextureTransform { scale: Vec2::new(-1.5, 2.0), offset: Vec2::new(0.125, 0.0) };
+        let random = Random::new(3, 0);
+        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+            // The last one lacks texels.
+            for (width, height) in [(5, 3), (3, 5), (1, 15), (15, 1), (8, 8)] {
+                let t = Texture { width, height, texels: Texels::Srgb8(&texels), wrap, transform };
+                let (mut block, mut mixture) = (TextureBlock::EMPTY, [[0.0; 16]; 3]);
+                let uv: [Vec2; 16] = core::array::from_fn(|i| match i {
+                    0 => Vec2::new(f32::NAN, 1e30),
+                    _ => 4.0 * Vec2::new(random.single(2 * i as u32), random.single(2 * i as u32 + 1)) - 2.0,
+                });
+                let found: [_; 16] =
+                    core::array::from_fn(|i| t.put(&mut block, i, uv[i]).unwrap_or_default());
+                block.surround(Level::detect());
+                (0..16).for_each(|i| load(&mut block, i, found[i]));
+                block.mix(Level::detect(), &mut mixture);
+                for (i, uv) in uv.into_iter().enumerate() {
+                    let [r, g, b, _] = t.lookup(uv);
+                    assert_eq!(at(&mixture, i), [r, g, b], "{width} {height} {uv}");
+                }
+            }
         }
     }
 
