@@ -14,6 +14,7 @@ use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
 use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
+use halflight_simd::kernels::shade::texture::TextureBlock;
 use halflight_simd::kernels::shade::{Row, Row3};
 
 /// One input.
@@ -171,6 +172,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     };
     check_coats(&mut rows, input.arbitrary()?, &surface, &coats, &specular);
     check_sky(&mut rows, active, flags & 2 == 0);
+    check_textures(&mut rows, flags);
     for level in Level::detect().and_below() {
         let mut found = SurfaceBlock::EMPTY;
         surfaces.compute(level, &mut found);
@@ -232,6 +234,30 @@ fn check_sky(rows: &mut Rows, active: u32, is_map: bool) {
         assert_eq!(samples.compute(level, &mut found.0, &mut found.1), set, "{level:?}");
         check("sky direction", 0xffff, &found.0, &direction);
         check("sky density", 0xffff, &[found.1], &[pdf]);
+    }
+}
+
+/// Texture look-ups at every level against their scalar reference.
+fn check_textures(rows: &mut Rows, clamps: u32) {
+    let size = |row: Row| row.map(|x| 1.0 + (x * 5000.0).floor());
+    let given = TextureBlock {
+        at: [rows.row(), rows.row()],
+        size: [size(rows.unit()), size(rows.unit())],
+        clamps,
+        texels: [rows.vectors(), rows.vectors(), rows.vectors(), rows.vectors()],
+        ..TextureBlock::EMPTY
+    };
+    let (mut wanted, mut mixture) = (given.clone(), rows.vectors());
+    wanted.surround_reference();
+    wanted.mix_reference(&mut mixture);
+    for level in Level::detect().and_below() {
+        let (mut found, mut mixed) = (given.clone(), mixture);
+        found.surround(level);
+        found.mix(level, &mut mixed);
+        check("first texels", 0xffff, &found.first, &wanted.first);
+        check("second texels", 0xffff, &found.second, &wanted.second);
+        check("weights of texels", 0xffff, &found.weight, &wanted.weight);
+        check("mixture", 0xffff, &mixed, &mixture);
     }
 }
 

@@ -10,7 +10,21 @@ impl Bsdf {
     /// BSDF of `material` at texture coordinates `uv`, seen from its front or its back.
     #[inline]
     pub fn at<F: Features>(scene: &Scene, material: &Material, uv: Vec2, front: bool) -> Bsdf {
-        let color = |input: &ColorInput| unit_rgb(input.at::<F>(scene, uv));
+        Self::of_texel::<F>((scene, material), None, uv, front)
+    }
+
+    /// [`Bsdf::at`] with the texel of [`Surface::color`], if it has been looked up.
+    #[inline]
+    pub(crate) fn of_texel<F: Features>(
+        (scene, material): (&Scene, &Material),
+        texel: Option<Rgb>,
+        uv: Vec2,
+        front: bool,
+    ) -> Bsdf {
+        let color = |input: &ColorInput| match texel {
+            Some(texel) => unit_rgb(input.value * texel),
+            None => unit_rgb(input.at::<F>(scene, uv)),
+        };
         let alpha = |input: &ScalarInput| alpha(input.at::<F>(scene, uv));
         match &material.surface {
             Surface::Diffuse { reflectance } => Bsdf::Diffuse(Diffuse { reflectance: color(reflectance) }),
@@ -21,7 +35,7 @@ impl Bsdf {
                 Bsdf::Conductor(Conductor { f0: color(reflectance), alpha: alpha(roughness) })
             }
             Surface::Glossy { base, specular, roughness, metallic, ior } if F::GLOSSY => {
-                let (base, specular) = (color(base), color(specular));
+                let (base, specular) = (color(base), unit_rgb(specular.at::<F>(scene, uv)));
                 let (alpha, metallic) = (alpha(roughness), unit(metallic.at::<F>(scene, uv)));
                 match *ior {
                     Some(ior) => Bsdf::Plastic(Plastic::new(base, specular, alpha, metallic, ior)),

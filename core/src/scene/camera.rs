@@ -108,9 +108,10 @@ impl Camera {
         level: Level,
         [width, height]: [u32; 2],
         raster: &[[f32; 16]; 2],
-    ) -> Option<[Ray; 16]> {
+        out: &mut [[f32; 8]; 16],
+    ) -> bool {
         if self.lens_radius > 0.0 || self.start.is_some() {
-            return None;
+            return false;
         }
         let rays = CameraRays {
             eye: self.eye.to_array(),
@@ -119,9 +120,8 @@ impl Camera {
             half: [0.5 * width as f32, 0.5 * height as f32],
             raster,
         };
-        let mut records = [[0.0; 8]; 16];
-        rays.compute(level, &mut records);
-        Some(bytemuck::cast(records))
+        rays.compute(level, out);
+        true
     }
 
     /// Inverse of [`Camera::ray`]: the projection of `point` through the point `lens` of the lens. `None`

@@ -50,6 +50,19 @@ pub enum Surface {
     },
 }
 
+impl Surface {
+    /// Colour of the whole surface, or of the base below its coat. `None` for a dielectric.
+    #[inline]
+    pub(crate) fn color(&self) -> Option<&ColorInput> {
+        match self {
+            Self::Diffuse { reflectance } | Self::Mirror { reflectance } => Some(reflectance),
+            Self::Conductor { reflectance, .. } => Some(reflectance),
+            Self::Glossy { base, .. } => Some(base),
+            Self::Dielectric { .. } => None,
+        }
+    }
+}
+
 /// Texture that perturbs the shading normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalMap {

@@ -18,6 +18,7 @@ pub use light::{Environment, PointLight};
 pub use material::{Material, NormalMap, Surface};
 pub use mesh::{Mesh, Triangle};
 pub use surface::SurfacePoint;
+pub(crate) use texture::load;
 pub use texture::{Texels, Texture, TextureId, TextureTransform, Wrap};
 
 /// Everything that a picture shows.

@@ -1,7 +1,10 @@
 //! Texture lookup from borrowed texels: bilinear, wrapped, decoded to linear. No input panics: coordinates
 //! that are not finite count as 0, and a texture without texels is white.
 
+use core::ops::RangeInclusive;
 use glam::{Vec2, Vec3, Vec4};
+use halflight_simd::kernels::shade::put;
+use halflight_simd::kernels::shade::texture::{MAX_SIZE, TextureBlock};
 
 /// Index into the textures of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -82,6 +85,22 @@ impl Texture<'_> {
         a.lerp(b, fx).lerp(c.lerp(d, fx), fy).to_array()
     }
 
+    /// Stores the place of a look-up at `uv` as look-up `i` of a block. Returns the texels and their number
+    /// across, or `None` if lanes do not look up this texture.
+    #[inline]
+    pub(crate) fn put(&self, block: &mut TextureBlock, i: usize, uv: Vec2) -> Option<(&[[u8; 4]], usize)> {
+        const SIZES: RangeInclusive<u32> = 1..=MAX_SIZE;
+        let Texels::Srgb8(texels) = self.texels else { return None };
+        if !(SIZES.contains(&self.width) && SIZES.contains(&self.height)) {
+            return None;
+        }
+        let (uv, i) = (self.transform.at(uv), i & 15);
+        (block.at[0][i], block.at[1][i]) = (uv.x, 1.0 - uv.y);
+        (block.size[0][i], block.size[1][i]) = (self.width as f32, self.height as f32);
+        block.clamps = block.clamps & !(1 << i) | u32::from(self.wrap == Wrap::Clamp) << i;
+        Some((texels, self.width as usize))
+    }
+
     /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates, for height
     /// maps. Central differences over one texel make it continuous.
     pub fn gradient(&self, uv: Vec2) -> Vec2 {
@@ -129,6 +148,19 @@ fn srgb(texels: &[[u8; 4]], index: usize) -> Vec4 {
     let Some(&[r, g, b, a]) = texels.get(index) else { return Vec4::ONE };
     let linear = |byte: u8| SRGB_TO_LINEAR[byte as usize];
     Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+}
+
+/// Loads the texels of look-up `i` of a block, which [`Texture::put`] has returned.
+#[inline]
+pub(crate) fn load(block: &mut TextureBlock, i: usize, (texels, width): (&[[u8; 4]], usize)) {
+    let i = i & 15;
+    let (left, right) = (block.first[0][i] as usize, block.second[0][i] as usize);
+    let (top, bottom) = (block.first[1][i] as usize * width, block.second[1][i] as usize * width);
+    let texel = |index: usize| srgb(texels, index).truncate().to_array();
+    put(&mut block.texels[0], i, texel(top + left));
+    put(&mut block.texels[1], i, texel(top + right));
+    put(&mut block.texels[2], i, texel(bottom + left));
+    put(&mut block.texels[3], i, texel(bottom + right));
 }
 
 impl Wrap {
@@ -195,6 +227,9 @@ const fn power_12_5(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Level;
+    use crate::sampling::Random;
+    use halflight_simd::kernels::shade::at;
 
     const IDENTITY: TextureTransform = TextureTransform::IDENTITY;
     const RGBW: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
@@ -254,6 +289,33 @@ mod tests {
         for uv in [Vec2::ZERO, Vec2::new(0.125, 0.75), Vec2::new(-3.375, 0.0625)] {
             assert_eq!(moved.lookup(uv), plain.lookup(scale * uv + offset));
             assert_eq!(moved.gradient(uv), plain.gradient(scale * uv + offset));
+        }
+    }
+
+    #[test]
+    fn look_ups_of_a_block_have_the_bits_of_single_ones() {
+        let texels: [[u8; 4]; 15] = core::array::from_fn(|i| [17 * i as u8, 90 + 11 * i as u8, i as u8, 0]);
+        let transform = TextureTransform { scale: Vec2::new(-1.5, 2.0), offset: Vec2::new(0.125, 0.0) };
+        let random = Random::new(3, 0);
+        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+            // The last one lacks texels.
+            for (width, height) in [(5, 3), (3, 5), (1, 15), (15, 1), (8, 8)] {
+                let t = Texture { width, height, texels: Texels::Srgb8(&texels), wrap, transform };
+                let (mut block, mut mixture) = (TextureBlock::EMPTY, [[0.0; 16]; 3]);
+                let uv: [Vec2; 16] = core::array::from_fn(|i| match i {
+                    0 => Vec2::new(f32::NAN, 1e30),
+                    _ => 4.0 * Vec2::new(random.single(2 * i as u32), random.single(2 * i as u32 + 1)) - 2.0,
+                });
+                let found: [_; 16] =
+                    core::array::from_fn(|i| t.put(&mut block, i, uv[i]).unwrap_or_default());
+                block.surround(Level::detect());
+                (0..16).for_each(|i| load(&mut block, i, found[i]));
+                block.mix(Level::detect(), &mut mixture);
+                for (i, uv) in uv.into_iter().enumerate() {
+                    let [r, g, b, _] = t.lookup(uv);
+                    assert_eq!(at(&mixture, i), [r, g, b], "{width} {height} {uv}");
+                }
+            }
         }
     }
 

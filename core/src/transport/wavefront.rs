@@ -78,18 +78,20 @@ impl PathState {
     /// Path before its first segment: sample `sample` of pixel `pixel` of the picture, at `place` in its
     /// tile.
     pub(in crate::transport) fn new(pixel: u32, place: u32, sample: u32, classes: PathClasses) -> Self {
-        Self {
-            throughput: [1.0; 3],
-            pdf: f32::INFINITY,
-            pixel,
-            place,
-            sample,
-            segments: 1,
-            classes,
-            triangle: MISS,
-            eta_squared: 1.0,
-            ..Self::default()
-        }
+        let mut path = Self::default();
+        path.begin(pixel, place, sample, classes);
+        path
+    }
+
+    /// Replaces the path by [`PathState::new`]. In its slot of the wave, field by field: a copy of the whole
+    /// would wait for the narrow fields.
+    #[inline]
+    pub(in crate::transport) fn begin(&mut self, pixel: u32, place: u32, sample: u32, classes: PathClasses) {
+        *self = Self::zeroed();
+        (self.throughput, self.pdf) = ([1.0; 3], f32::INFINITY);
+        (self.pixel, self.place, self.sample) = (pixel, place, sample);
+        (self.segments, self.classes) = (1, classes);
+        (self.triangle, self.eta_squared) = (MISS, 1.0);
     }
 
     /// Adds to the radiance of the path.

@@ -127,10 +127,10 @@ impl<S: Simd> SlabRays16<S> {
     pub fn moved(&self, simd: S, boxes: &Boxes8, i: usize) -> [[S::F16; 3]; 2] {
         let [x, y, z] = self.near;
         let [ox, oy, oz] = self.origin;
-        let plane = [x, y, z, x ^ 1, y ^ 1, z ^ 1].map(|row| boxes[row & 7][i & 7]);
+        let plane = |row: usize| simd.splat16(boxes[row & 7][i & 7]);
         [
-            [simd.splat16(plane[0]) - ox, simd.splat16(plane[1]) - oy, simd.splat16(plane[2]) - oz],
-            [simd.splat16(plane[3]) - ox, simd.splat16(plane[4]) - oy, simd.splat16(plane[5]) - oz],
+            [plane(x) - ox, plane(y) - oy, plane(z) - oz],
+            [plane(x ^ 1) - ox, plane(y ^ 1) - oy, plane(z ^ 1) - oz],
         ]
     }
 

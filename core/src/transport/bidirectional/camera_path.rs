@@ -24,6 +24,8 @@ pub(super) struct CameraPath {
     pub(super) blur: [f32; 3],
     /// Index of the pixel in its tile.
     pub(super) place: u32,
+    /// Index of the pixel in the picture.
+    pub(super) pixel: u32,
     /// The last vertex, and its normal for light sampling.
     pub(super) position: [f32; 3],
     pub(super) normal: [f32; 3],

@@ -21,6 +21,7 @@ use crate::transport::bidirectional::vertex::{LightVertex, is_bent};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
+use crate::transport::walk::points::{Met, PointBlock};
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use crate::transport::walk::visibility::ShadowRays;
 use core::ops::Range;
@@ -187,7 +188,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 indices: &mut *indices,
                 drawn: &mut *drawn,
             };
-            self.trace(sample, &tile, wave, count, &mut queue, &mut counters);
+            self.trace(sample, wave, count, &mut queue, &mut counters);
             done(sample, &paths[..count], &mut counters);
         }
         Ok((queue.recorder, counters))
@@ -199,7 +200,8 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let mut count = 0;
         for place in 0..PIXELS_PER_TILE {
             let Some((x, y)) = tile.pixel(place) else { continue };
-            let sampler = Sampler::new(seed, y * width + x, sample);
+            let pixel = y * width + x;
+            let sampler = Sampler::new(seed, pixel, sample);
             let [dx, dy] = sampler.pair(dimension::PIXEL);
             let lens = sampler.pair(dimension::LENS);
             let ray = self.context.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
@@ -208,6 +210,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 throughput: [1.0; 3],
                 pdf: f32::INFINITY,
                 place: place as u32,
+                pixel,
                 segments: 1,
                 triangle: MISS,
                 eta_squared: 1.0,
@@ -223,7 +226,6 @@ impl<'a, F: Features> CameraPaths<'a, F> {
     fn trace(
         &self,
         sample: u32,
-        tile: &Tile,
         Wave { paths, rays, hits, indices, drawn }: Wave,
         count: usize,
         queue: &mut Queue,
@@ -231,14 +233,12 @@ impl<'a, F: Features> CameraPaths<'a, F> {
     ) {
         let mut active = count;
         let mut coherence = Coherence::Coherent;
+        let mut points = PointBlock::new();
         while active > 0 {
             counters.rays += active as u64;
             self.context.nearest_batch(&rays[..active], coherence, &mut hits[..active]);
             coherence = Coherence::Incoherent;
-            let sampler_of = |path: &CameraPath| {
-                let (x, y) = tile.pixel(path.place as usize).unwrap_or_default();
-                Sampler::new(self.settings.seed, y * self.settings.width + x, sample)
-            };
+            let sampler_of = |path: &CameraPath| Sampler::new(self.settings.seed, path.pixel, sample);
             let vertices = self.connections.vertices;
             let each = if vertices.is_empty() { 0 } else { self.connections.count as usize };
             for (i, ray) in rays[..active].iter().enumerate() {
@@ -254,11 +254,12 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             let mut left = 0;
             queue.count = 0;
             for i in 0..active {
+                let met = self.context.met(&mut points, (&rays[..active], &hits[..active]), i);
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
                 let sampler = sampler_of(path);
                 let drawn = drawn.get(i * each..(i + 1) * each).unwrap_or_default();
-                if let Some(next) = self.step(path, (sampler, drawn), &ray, &hit, queue, counters) {
+                if let Some(next) = self.step(path, (sampler, drawn), (&ray, &hit, met), queue, counters) {
                     rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }
@@ -283,8 +284,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         &self,
         path: &mut CameraPath,
         (sampler, drawn): (Sampler, &[LightVertex]),
-        ray: &Ray,
-        hit: &Hit,
+        (ray, hit, met): (&Ray, &Hit, Met),
         queue: &mut Queue,
         counters: &mut Counters,
     ) -> Option<Ray> {
@@ -295,7 +295,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             queue.record(Class::Paths, path.history.rest_of_hit(), path, before);
             return None;
         }
-        let point = self.context.surface_at(ray, hit)?;
+        let point = met.point()?;
         let opacity = || sampler.single(dimension::opacity(path.segments, path.crossings));
         let is_skipped = self.context.is_skipped(&point, hit, path.triangle, opacity)
             || path.segments == 1 && point.is_left_by(ray);
@@ -314,7 +314,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         if path.segments >= self.settings.max_depth {
             return None;
         }
-        let bsdf = self.context.bsdf_at(&point);
+        let bsdf = met.bsdf::<F>(self.context.scene);
         path.history = path.history.on_camera_path(&bsdf);
         let wo = point.frame.to_local(-direction);
         let is_bent = is_bent(&point, wo);

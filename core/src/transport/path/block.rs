@@ -2,12 +2,11 @@
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Diffuse, Features};
-use crate::geometry::Frame;
 use crate::light::LightSample;
-use crate::scene::{Material, SurfacePoint};
+use crate::transport::walk::points::PointBlock;
 use crate::transport::walk::termination::TRAPPED_FROM;
 use crate::transport::wavefront::BLOCK;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::coat::CoatBlock;
 use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
@@ -16,16 +15,12 @@ use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
 use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
 use halflight_simd::kernels::shade::sky::SkyBlock;
 use halflight_simd::kernels::shade::specular::SpecularBlock;
-use halflight_simd::kernels::shade::surface::SurfaceBlock;
-use halflight_simd::kernels::shade::{Row, Row3, at, put};
+use halflight_simd::kernels::shade::{Row, Row3, put};
 
 /// Inputs and results of the kernels, and parts of the vertices that only loops use. Rows of vertices that a
 /// stage does not use keep old values.
 pub(super) struct Block<'a> {
-    pub(super) corners: [Row3; 3],
-    pub(super) normals: [Row3; 3],
-    pub(super) weights: [Row; 2],
-    pub(super) surface: SurfaceBlock,
+    pub(super) points: PointBlock<'a>,
     pub(super) bsdf: BsdfBlock,
     pub(super) coats: CoatBlock,
     pub(super) specular: SpecularBlock,
@@ -54,9 +49,6 @@ pub(super) struct Block<'a> {
     pub(super) side: Row3,
     pub(super) path: [u32; BLOCK],
     pub(super) segments: [u32; BLOCK],
-    pub(super) triangle: [u32; BLOCK],
-    pub(super) material: [&'a Material; BLOCK],
-    pub(super) uv: [Vec2; BLOCK],
     /// BSDFs that lanes do not sample, and coats.
     pub(super) others: [Bsdf; BLOCK],
     /// First triangles of the sampled area lights.
@@ -78,43 +70,11 @@ pub(super) struct Stages {
     pub(super) single: u32,
 }
 
-/// Set of vertices of a block.
-#[derive(Clone, Copy)]
-pub(super) struct Set(pub(super) u32);
-
-impl Iterator for Set {
-    type Item = usize;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        let i = self.0.trailing_zeros() as usize;
-        self.0 &= self.0.wrapping_sub(1);
-        (i < BLOCK).then_some(i)
-    }
-}
-
-impl Set {
-    /// Vertices whose number in `row` has the property `is`.
-    #[inline(always)]
-    pub(super) fn of(row: &[u32; BLOCK], is: impl Fn(u32) -> bool) -> u32 {
-        let mut set = 0;
-        for (i, value) in row.iter().enumerate() {
-            set |= u32::from(is(*value)) << i;
-        }
-        set
-    }
-}
-
-static GREY: Material = Material::GREY;
-
 impl<'a> Block<'a> {
     /// Without vertices.
     pub(super) fn new() -> Self {
         Self {
-            corners: [[[0.0; BLOCK]; 3]; 3],
-            normals: [[[0.0; BLOCK]; 3]; 3],
-            weights: [[0.0; BLOCK]; 2],
-            surface: SurfaceBlock::EMPTY,
+            points: PointBlock::new(),
             bsdf: BsdfBlock::EMPTY,
             coats: CoatBlock::EMPTY,
             specular: SpecularBlock::EMPTY,
@@ -139,9 +99,6 @@ impl<'a> Block<'a> {
             side: [[0.0; BLOCK]; 3],
             path: [0; BLOCK],
             segments: [1; BLOCK],
-            triangle: [0; BLOCK],
-            material: [&GREY; BLOCK],
-            uv: [Vec2::ZERO; BLOCK],
             others: [Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }); BLOCK],
             lamp: [0; BLOCK],
             is_lone: false,
@@ -210,42 +167,6 @@ impl<'a> Block<'a> {
         let SpecularBlock { exists, metal, dielectric, .. } = &mut self.specular;
         (*exists, *metal, *dielectric) = (0, 0, 0);
     }
-
-    /// Stores a surface point computed without lanes.
-    pub(super) fn put_point(&mut self, i: usize, point: &SurfacePoint, direction: Vec3) {
-        let surface = &mut self.surface;
-        put(&mut surface.position, i, point.position.to_array());
-        surface.error[i & 15] = point.error;
-        put(&mut surface.geometric_normal, i, point.geometric_normal.to_array());
-        let Frame { tangent, bitangent, normal } = point.frame;
-        for (rows, axis) in surface.frame.iter_mut().zip([tangent, bitangent, normal]) {
-            put(rows, i, axis.to_array());
-        }
-        put(&mut surface.wo, i, point.frame.to_local(-direction).to_array());
-        surface.front = surface.front & !(1 << i) | u32::from(point.front) << i;
-    }
-
-    /// Surface point of vertex `i`.
-    #[inline]
-    pub(super) fn point(&self, i: usize) -> SurfacePoint<'a> {
-        let i = i & 15;
-        let Self { surface, .. } = self;
-        let [tangent, bitangent, normal] = &surface.frame;
-        SurfacePoint {
-            position: at(&surface.position, i).into(),
-            error: surface.error[i & 15],
-            geometric_normal: at(&surface.geometric_normal, i).into(),
-            frame: Frame {
-                tangent: at(tangent, i).into(),
-                bitangent: at(bitangent, i).into(),
-                normal: at(normal, i).into(),
-            },
-            uv: self.uv[i],
-            front: surface.front >> i & 1 == 1,
-            material: self.material[i],
-            triangle: self.triangle[i],
-        }
-    }
 }
 
 /// Stores a light sample of the vertex `i` at `position`.
@@ -274,6 +195,7 @@ mod tests {
     use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic};
     use crate::sampling::Random;
     use crate::sampling::warp::uniform_sphere;
+    use halflight_simd::kernels::shade::at;
     use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
     use halflight_simd::kernels::shade::specular::SpecularSamples;
 
@@ -298,7 +220,7 @@ mod tests {
         let (mut block, level) = (Block::new(), Level::detect());
         for round in 0..200 {
             block.clear_bsdfs();
-            block.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            block.points.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
                 .map(|axis| axis.map(|coordinate| [coordinate; BLOCK]));
             let (mut lobe, mut all) = ([0.0; BLOCK], [Bsdf::Mirror(Mirror { reflectance: Rgb::ONE }); BLOCK]);
             for i in 0..BLOCK {
@@ -306,7 +228,7 @@ mod tests {
                 let number = |k: u32| random.single(20 * n + k);
                 let wo = uniform_sphere([number(6), number(7)]);
                 put(
-                    &mut block.surface.wo,
+                    &mut block.points.surface.wo,
                     i,
                     [wo.x, wo.y, if n.is_multiple_of(9) { 0.0 } else { wo.z.abs() }],
                 );
@@ -315,8 +237,9 @@ mod tests {
                 (lobe[i], all[i]) = (number(12), surfaces(&random, n));
                 block.put_bsdf::<All>(i, &all[i], 1);
             }
-            block.coats.see(level, &block.surface, &COATS);
-            let Block { surface, coats, specular, light, numbers, value, pdf, given, .. } = &mut block;
+            block.coats.see(level, &block.points.surface, &COATS);
+            let Block { points, coats, specular, light, numbers, value, pdf, given, .. } = &mut block;
+            let surface = &points.surface;
             CoatLight { surface, coats, tables: &COATS, direction: &light.direction }
                 .compute(level, value, pdf);
             let u = &numbers.scatter;

@@ -47,7 +47,7 @@ use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::path_classes::PathClasses;
-use crate::transport::wavefront::{BLOCK, PathState, Wavefront};
+use crate::transport::wavefront::{BLOCK, Wavefront};
 use crate::{Level, Rgb};
 use block::Block;
 use core::ops::Range;
@@ -252,7 +252,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let pixel = y * self.settings.width + x;
         let classes = if is_on_silhouette { PathClasses::WITHOUT_EMISSION } else { PathClasses::ALL };
         wave.wave.rays[index].origin = [x as f32, y as f32, 0.0];
-        wave.wave.paths[index] = PathState::new(pixel, place, sample, classes);
+        wave.wave.paths[index].begin(pixel, place, sample, classes);
         wave.begin(index, circle);
     }
 
@@ -262,6 +262,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let (level, camera) = (self.context.level, &self.context.scene.camera);
         let mut samples = SampleBlock::EMPTY;
         let mut raster = [[0.0; BLOCK]; 2];
+        let mut aimed = [[0.0; 8]; BLOCK];
         for start in (0..count).step_by(BLOCK) {
             let end = count.min(start + BLOCK);
             for (i, path) in wave.paths[start..end].iter().enumerate() {
@@ -274,9 +275,10 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 let [x, y, _] = ray.origin;
                 (raster[0][i & 15], raster[1][i & 15]) = (x + dx[i & 15], y + dy[i & 15]);
             }
-            if let Some(aimed) = camera.rays(level, [width, height], &raster) {
-                for (i, (ray, aimed)) in rays.iter_mut().zip(aimed).enumerate() {
-                    *ray = Ray { tag: (start + i) as u32, ..aimed };
+            if camera.rays(level, [width, height], &raster, &mut aimed) {
+                for (i, (ray, aimed)) in rays.iter_mut().zip(&aimed).enumerate() {
+                    *ray = bytemuck::cast(*aimed);
+                    ray.tag = (start + i) as u32;
                 }
                 continue;
             }

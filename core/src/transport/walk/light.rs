@@ -17,6 +17,7 @@ use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::history::History;
+use crate::transport::walk::points::{Met, PointBlock};
 use crate::transport::walk::sums::Sums;
 use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
 use bytemuck::{Pod, Zeroable};
@@ -194,6 +195,7 @@ impl<F: Features> LightWalk<'_, F> {
         let rays = arena.slice::<Ray>(PATHS_PER_TASK)?;
         let hits = arena.slice::<Hit>(PATHS_PER_TASK)?;
         let mut counters = Counters::default();
+        let mut points = PointBlock::new();
         let mut active = 0;
         for (i, state) in states.iter_mut().enumerate().take(paths) {
             let number = (first + i) as u32;
@@ -220,10 +222,12 @@ impl<F: Features> LightWalk<'_, F> {
             self.context.nearest_batch(&rays[..active], Coherence::Incoherent, &mut hits[..active]);
             let mut going_on = 0;
             for i in 0..active {
+                let met = self.context.met(&mut points, (&rays[..active], &hits[..active]), i);
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(state) = states.get_mut(ray.tag as usize) else { continue };
                 let numbers = numbers_of(state.number);
-                if let Some(next) = self.step(state, &numbers, &ray, &hit, visitor, &mut counters) {
+                let met = (&ray, &hit, met);
+                if let Some(next) = self.step(state, &numbers, met, visitor, &mut counters) {
                     rays[going_on] = Ray { tag: ray.tag, ..next };
                     going_on += 1;
                 }
@@ -238,12 +242,11 @@ impl<F: Features> LightWalk<'_, F> {
         &self,
         state: &mut LightPathState,
         numbers: &N,
-        ray: &Ray,
-        hit: &Hit,
+        (ray, hit, met): (&Ray, &Hit, Met),
         visitor: &mut V,
         counters: &mut Counters,
     ) -> Option<Ray> {
-        let point = self.context.surface_at(ray, hit)?;
+        let point = met.point()?;
         let direction = Vec3::from(ray.direction);
         let opacity = || numbers.single(dimension::opacity(state.segments, state.crossings));
         if self.context.is_skipped(&point, hit, state.triangle, opacity) {
@@ -258,7 +261,7 @@ impl<F: Features> LightWalk<'_, F> {
         if state.segments >= self.max_depth {
             return None;
         }
-        let bsdf = self.context.bsdf_at(&point);
+        let bsdf = met.bsdf::<F>(self.context.scene);
         let first = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
         let (barycentric, to_light, opacity) = ([hit.u, hit.v], -direction, self.context.opacity_at(&point));
         let vertex = Vertex { point: &point, bsdf: &bsdf, barycentric, to_light, opacity, numbers, first };

@@ -7,6 +7,7 @@ pub(in crate::transport) mod history;
 pub(in crate::transport) mod light;
 pub(in crate::transport) mod mis;
 pub(in crate::transport) mod path_classes;
+pub(in crate::transport) mod points;
 pub(in crate::transport) mod sums;
 pub(in crate::transport) mod termination;
 pub(in crate::transport) mod visibility;

@@ -2,10 +2,11 @@
 
 use super::fresnel::schlick;
 use super::ggx::Ggx;
+use super::load::Load;
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, scale};
-use super::{Row, Row3, at, load3};
-use crate::lanes::{Lanes, Simd, dot};
+use super::{Row, Row3};
+use crate::lanes::{Lanes, dot};
 
 /// Least height of a viewer above the horizon: squares of half-vectors are normal floats.
 const RESOLUTION: f32 = 1e-7;
@@ -84,47 +85,31 @@ pub(super) fn metal<L: Lanes>(f0: [L; 3], alpha: L, wo: [L; 3], wi: [L; 3]) -> (
     )
 }
 
-/// Lane `i` of vertices.
+/// Vertices of a block over lanes.
 #[inline(always)]
-pub(super) fn lane(
+pub(super) fn vertices<F: Load>(
+    from: F,
     surface: &SurfaceBlock,
     bsdf: &BsdfBlock,
     throughput: &Row3,
-    i: usize,
-) -> VertexLanes<f32> {
+) -> VertexLanes<F::Lanes> {
     VertexLanes {
-        position: at(&surface.position, i),
-        error: surface.error[i],
-        geometric_normal: at(&surface.geometric_normal, i),
-        frame: [at(&surface.frame[0], i), at(&surface.frame[1], i), at(&surface.frame[2], i)],
-        wo: at(&surface.wo, i),
-        throughput: at(throughput, i),
-        reflectance: at(&bsdf.reflectance, i),
-        alpha: bsdf.alpha[i],
-        diffuse: bsdf.diffuse >> i & 1 == 1,
-        metal: bsdf.metal >> i & 1 == 1,
+        position: from.row3(&surface.position),
+        error: from.row(&surface.error),
+        geometric_normal: from.row3(&surface.geometric_normal),
+        frame: frame(from, surface),
+        wo: from.row3(&surface.wo),
+        throughput: from.row3(throughput),
+        reflectance: from.row3(&bsdf.reflectance),
+        alpha: from.row(&bsdf.alpha),
+        diffuse: from.set(bsdf.diffuse),
+        metal: from.set(bsdf.metal),
     }
 }
 
-/// Vertices of a block over lanes.
+/// Shading frames of a block over lanes.
 #[inline(always)]
-pub(super) fn vertices<S: Simd>(
-    simd: S,
-    surface: &SurfaceBlock,
-    bsdf: &BsdfBlock,
-    throughput: &Row3,
-) -> VertexLanes<S::F16> {
+pub(super) fn frame<F: Load>(from: F, surface: &SurfaceBlock) -> [[F::Lanes; 3]; 3] {
     let [tangent, bitangent, normal] = &surface.frame;
-    VertexLanes {
-        position: load3(simd, &surface.position),
-        error: simd.load16(&surface.error),
-        geometric_normal: load3(simd, &surface.geometric_normal),
-        frame: [load3(simd, tangent), load3(simd, bitangent), load3(simd, normal)],
-        wo: load3(simd, &surface.wo),
-        throughput: load3(simd, throughput),
-        reflectance: load3(simd, &bsdf.reflectance),
-        alpha: simd.load16(&bsdf.alpha),
-        diffuse: simd.mask16(bsdf.diffuse),
-        metal: simd.mask16(bsdf.metal),
-    }
+    [from.row3(tangent), from.row3(bitangent), from.row3(normal)]
 }

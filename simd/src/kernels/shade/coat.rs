@@ -6,14 +6,15 @@
 //! S = (1 - c)^5. One of a coat of Schlick reflects metal + (1 - metal) · S. The part of a coat that depends
 //! on the viewer is computed once a vertex.
 
-use super::bsdf::viewer;
+use super::bsdf::{frame, viewer};
 use super::coat_tables::{AMPLITUDES, CoatTables, LAST_AMPLITUDE, STEP, TablePlace, lerp, place, unit};
 use super::fresnel::{fresnel, schlick_weight};
 use super::ggx::Ggx;
+use super::load::{All, Load, One};
 use super::scatter::ScatterBlock;
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, divide, mul, scale, sub};
-use super::{Row, Row3, at, load3, put, warp};
+use super::{Row, Row3, load3, put, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 use core::f32::consts::FRAC_1_PI;
@@ -210,39 +211,21 @@ struct SampleLanes<L: Lanes> {
     delta: L::Mask,
 }
 
-/// Lane `i` of coats.
-#[inline(always)]
-fn lane(coats: &CoatBlock, i: usize) -> CoatLanes<f32> {
-    CoatLanes {
-        base: at(&coats.base, i),
-        tint: at(&coats.tint, i),
-        metal: at(&coats.metal, i),
-        metallic: coats.metallic[i],
-        alpha: coats.alpha[i],
-        eta: coats.eta[i],
-        mean: at(&coats.mean, i),
-        exists: coats.exists >> i & 1 == 1,
-        dielectric: coats.dielectric >> i & 1 == 1,
-        transmittance: at(&coats.transmittance, i),
-        probability: coats.probability[i],
-    }
-}
-
 /// Coats of a block over lanes.
 #[inline(always)]
-fn coats<S: Simd>(simd: S, coats: &CoatBlock) -> CoatLanes<S::F16> {
+fn coats<F: Load>(from: F, coats: &CoatBlock) -> CoatLanes<F::Lanes> {
     CoatLanes {
-        base: load3(simd, &coats.base),
-        tint: load3(simd, &coats.tint),
-        metal: load3(simd, &coats.metal),
-        metallic: simd.load16(&coats.metallic),
-        alpha: simd.load16(&coats.alpha),
-        eta: simd.load16(&coats.eta),
-        mean: load3(simd, &coats.mean),
-        exists: simd.mask16(coats.exists),
-        dielectric: simd.mask16(coats.dielectric),
-        transmittance: load3(simd, &coats.transmittance),
-        probability: simd.load16(&coats.probability),
+        base: from.row3(&coats.base),
+        tint: from.row3(&coats.tint),
+        metal: from.row3(&coats.metal),
+        metallic: from.row(&coats.metallic),
+        alpha: from.row(&coats.alpha),
+        eta: from.row(&coats.eta),
+        mean: from.row3(&coats.mean),
+        exists: from.set(coats.exists),
+        dielectric: from.set(coats.dielectric),
+        transmittance: from.row3(&coats.transmittance),
+        probability: from.row(&coats.probability),
     }
 }
 
@@ -255,7 +238,8 @@ impl CoatBlock {
     /// Scalar reference; equals [`CoatBlock::see`] to the bit where coats exist.
     pub fn see_reference(&mut self, surface: &SurfaceBlock, tables: &CoatTables) {
         for i in 0..super::BLOCK {
-            let (transmittance, probability) = lane(self, i).see(tables, viewer(at(&surface.wo, i))[2]);
+            let [.., c] = viewer(One(i).row3(&surface.wo));
+            let (transmittance, probability) = coats(One(i), self).see(tables, c);
             put(&mut self.transmittance, i, transmittance);
             self.probability[i] = probability;
         }
@@ -270,8 +254,8 @@ impl Kernel for SeeKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self(block, surface, tables) = self;
-        let [.., c] = viewer(load3(simd, &surface.wo));
-        let (transmittance, probability) = coats(simd, block).see(tables, c);
+        let [.., c] = viewer(All(simd).row3(&surface.wo));
+        let (transmittance, probability) = coats(All(simd), block).see(tables, c);
         (block.transmittance, block.probability) = (vector::to_arrays(transmittance), probability.to_array());
     }
 }
@@ -296,6 +280,15 @@ fn to_local<L: Lanes>([tangent, bitangent, normal]: [[L; 3]; 3], direction: [L; 
 }
 
 impl CoatLight<'_> {
+    /// f |cos| and densities over lanes.
+    #[inline(always)]
+    fn at<F: Load>(&self, from: F) -> ([F::Lanes; 3], F::Lanes) {
+        let Self { surface, coats: block, tables, direction } = self;
+        let wi = to_local(frame(from, surface), from.row3(direction));
+        let (_, f, density) = coats(from, block).evaluate(tables, viewer(from.row3(&surface.wo)), wi);
+        (f, density)
+    }
+
     /// f |cos| and densities by the instructions of `level`, into the lanes of coats.
     pub fn compute(&self, level: Level, value: &mut Row3, pdf: &mut Row) {
         level.dispatch(LightKernel(self, value, pdf));
@@ -303,11 +296,8 @@ impl CoatLight<'_> {
 
     /// Scalar reference; equals [`CoatLight::compute`] to the bit.
     pub fn reference(&self, value: &mut Row3, pdf: &mut Row) {
-        let Self { surface, coats, tables, direction } = self;
-        for i in (0..super::BLOCK).filter(|i| coats.exists >> i & 1 == 1) {
-            let axes = [at(&surface.frame[0], i), at(&surface.frame[1], i), at(&surface.frame[2], i)];
-            let wi = to_local(axes, at(direction, i));
-            let (_, f, density) = lane(coats, i).evaluate(tables, viewer(at(&surface.wo, i)), wi);
+        for i in (0..super::BLOCK).filter(|i| self.coats.exists >> i & 1 == 1) {
+            let (f, density) = self.at(One(i));
             put(value, i, f);
             pdf[i] = density;
         }
@@ -321,14 +311,11 @@ impl Kernel for LightKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self(CoatLight { surface, coats: block, tables, direction }, value, pdf) = self;
-        let [tangent, bitangent, normal] = &surface.frame;
-        let axes = [load3(simd, tangent), load3(simd, bitangent), load3(simd, normal)];
-        let wi = to_local(axes, load3(simd, direction));
-        let coats = coats(simd, block);
-        let (_, f, density) = coats.evaluate(tables, viewer(load3(simd, &surface.wo)), wi);
-        *value = vector::to_arrays(vector::select(coats.exists, f, load3(simd, value)));
-        *pdf = density.select(coats.exists, simd.load16(pdf)).to_array();
+        let Self(light, value, pdf) = self;
+        let (f, density) = light.at(All(simd));
+        let exists = simd.mask16(light.coats.exists);
+        *value = vector::to_arrays(vector::select(exists, f, load3(simd, value)));
+        *pdf = density.select(exists, simd.load16(pdf)).to_array();
     }
 }
 
@@ -348,6 +335,14 @@ pub struct CoatSamples<'b> {
 }
 
 impl CoatSamples<'_> {
+    /// Samples over lanes.
+    #[inline(always)]
+    fn at<F: Load>(&self, from: F) -> SampleLanes<F::Lanes> {
+        let Self { surface, coats: block, tables, u, lobe } = self;
+        let u = [from.row(&u[0]), from.row(&u[1]), from.row(lobe)];
+        coats(from, block).sample(tables, viewer(from.row3(&surface.wo)), u)
+    }
+
     /// Samples by the instructions of `level`, into the lanes of coats. Returns the set of samples, and that
     /// of mirrored ones.
     pub fn compute(&self, level: Level, out: &mut ScatterBlock) -> [u32; 2] {
@@ -356,11 +351,9 @@ impl CoatSamples<'_> {
 
     /// Scalar reference; equals [`CoatSamples::compute`] to the bit where samples exist.
     pub fn reference(&self, out: &mut ScatterBlock) -> [u32; 2] {
-        let Self { surface, coats, tables, u, lobe } = self;
         let mut sets = [0; 2];
-        for i in (0..super::BLOCK).filter(|i| coats.exists >> i & 1 == 1) {
-            let wo = viewer(at(&surface.wo, i));
-            let sample = lane(coats, i).sample(tables, wo, [u[0][i], u[1][i], lobe[i]]);
+        for i in (0..super::BLOCK).filter(|i| self.coats.exists >> i & 1 == 1) {
+            let sample = self.at(One(i));
             put(&mut out.direction, i, sample.direction);
             put(&mut out.weight, i, sample.weight);
             (out.pdf[i], out.eta[i]) = (sample.pdf, 1.0);
@@ -378,11 +371,8 @@ impl Kernel for SampleKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> [u32; 2] {
-        let Self(CoatSamples { surface, coats: block, tables, u, lobe }, out) = self;
-        let coats = coats(simd, block);
-        let u = [simd.load16(&u[0]), simd.load16(&u[1]), simd.load16(lobe)];
-        let sample = coats.sample(tables, viewer(load3(simd, &surface.wo)), u);
-        let exists = coats.exists;
+        let Self(samples, out) = self;
+        let (sample, exists) = (samples.at(All(simd)), simd.mask16(samples.coats.exists));
         let (direction, weight) = (load3(simd, &out.direction), load3(simd, &out.weight));
         out.direction = vector::to_arrays(vector::select(exists, sample.direction, direction));
         out.weight = vector::to_arrays(vector::select(exists, sample.weight, weight));

@@ -3,10 +3,11 @@
 //!
 //! Values of BSDFs without lanes come from the caller.
 
-use super::bsdf::{BsdfBlock, VertexLanes, lane, metal, vertices};
+use super::bsdf::{BsdfBlock, VertexLanes, metal, vertices};
+use super::load::{All, Load, One};
 use super::surface::SurfaceBlock;
 use super::vector::{self, mul, scale, sub};
-use super::{Row, Row3, at, load3};
+use super::{Row, Row3};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 use core::f32::consts::FRAC_1_PI;
@@ -150,6 +151,24 @@ fn direct<L: Lanes>(
 }
 
 impl Direct<'_> {
+    /// Shadow rays over lanes.
+    #[inline(always)]
+    fn at<F: Load>(&self, from: F) -> ShadowLanes<F::Lanes> {
+        let light = LightLanes {
+            direction: from.row3(&self.light.direction),
+            end: from.row3(&self.light.end),
+            pdf: from.row(&self.light.pdf),
+            radiance: from.row3(&self.light.radiance),
+            exists: from.set(self.light.exists),
+            bounded: from.set(self.light.bounded),
+            area: from.set(self.light.area),
+            alone: from.set(self.light.alone),
+            balance: from.set(self.light.balance),
+        };
+        let vertex = vertices(from, self.surface, self.bsdf, self.throughput);
+        direct(&vertex, &light, (from.row3(self.value), from.row(self.pdf)), from.row(self.each))
+    }
+
     /// Shadow rays by the instructions of `level`, into `block`.
     pub fn compute(&self, level: Level, block: &mut ShadowBlock) {
         level.dispatch(DirectKernel(self, block));
@@ -159,20 +178,7 @@ impl Direct<'_> {
     pub fn reference(&self) -> ShadowBlock {
         let mut block = ShadowBlock::EMPTY;
         for i in 0..super::BLOCK {
-            let bit = |bits: u32| bits >> i & 1 == 1;
-            let light = LightLanes {
-                direction: at(&self.light.direction, i),
-                end: at(&self.light.end, i),
-                pdf: self.light.pdf[i],
-                radiance: at(&self.light.radiance, i),
-                exists: bit(self.light.exists),
-                bounded: bit(self.light.bounded),
-                area: bit(self.light.area),
-                alone: bit(self.light.alone),
-                balance: bit(self.light.balance),
-            };
-            let vertex = lane(self.surface, self.bsdf, self.throughput, i);
-            let ray = direct(&vertex, &light, (at(self.value, i), self.pdf[i]), self.each[i]);
+            let ray = self.at(One(i));
             let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
             block.rays[i] = [ox, oy, oz, ray.end, dx, dy, dz, 0.0];
             block.contribution[i] = [r, g, b, 0.0];
@@ -189,20 +195,7 @@ impl Kernel for DirectKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Direct { surface, bsdf, light, value, pdf, each, throughput } = self.0;
-        let light = LightLanes {
-            direction: load3(simd, &light.direction),
-            end: load3(simd, &light.end),
-            pdf: simd.load16(&light.pdf),
-            radiance: load3(simd, &light.radiance),
-            exists: simd.mask16(light.exists),
-            bounded: simd.mask16(light.bounded),
-            area: simd.mask16(light.area),
-            alone: simd.mask16(light.alone),
-            balance: simd.mask16(light.balance),
-        };
-        let vertex = vertices(simd, surface, bsdf, throughput);
-        let ray = direct(&vertex, &light, (load3(simd, value), simd.load16(pdf)), simd.load16(each));
+        let ray = self.0.at(All(simd));
         let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
         let zero = simd.splat16(0.0);
         let block = self.1;

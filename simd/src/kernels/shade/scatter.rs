@@ -2,12 +2,13 @@
 //!
 //! Samples of BSDFs without lanes come from the caller.
 
-use super::bsdf::{BsdfBlock, VertexLanes, lane, vertices};
+use super::bsdf::{BsdfBlock, VertexLanes, vertices};
 use super::fresnel::schlick;
 use super::ggx::Ggx;
+use super::load::{All, Load, One};
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, divide, mul, scale};
-use super::{Row, Row3, at, load3, put, warp};
+use super::{Row, Row3, put, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 use core::f32::consts::FRAC_1_PI;
@@ -152,6 +153,26 @@ fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLa
 }
 
 impl Scatter<'_> {
+    /// Next rays over lanes, and their vertices.
+    #[inline(always)]
+    fn at<F: Load>(&self, from: F) -> (NextLanes<F::Lanes>, VertexLanes<F::Lanes>) {
+        let given = ScatterLanes {
+            direction: from.row3(&self.given.direction),
+            weight: from.row3(&self.given.weight),
+            pdf: from.row(&self.given.pdf),
+            eta: from.row(&self.given.eta),
+            u: [from.row(&self.u[0]), from.row(&self.u[1])],
+            roulette: from.row(self.roulette),
+            most: from.row(self.most),
+            factor: from.row3(self.factor),
+            eta_squared: from.row(self.eta_squared),
+            active: from.set(self.active),
+            certain: from.set(self.certain),
+        };
+        let vertex = vertices(from, self.surface, self.bsdf, self.throughput);
+        (scatter(&vertex, &given), vertex)
+    }
+
     /// Next rays by the instructions of `level`, into `block`.
     pub fn compute(&self, level: Level, block: &mut NextBlock) {
         level.dispatch(ScatterKernel(self, block));
@@ -161,21 +182,7 @@ impl Scatter<'_> {
     pub fn reference(&self) -> NextBlock {
         let mut block = NextBlock::EMPTY;
         for i in 0..super::BLOCK {
-            let given = ScatterLanes {
-                direction: at(&self.given.direction, i),
-                weight: at(&self.given.weight, i),
-                pdf: self.given.pdf[i],
-                eta: self.given.eta[i],
-                u: [self.u[0][i], self.u[1][i]],
-                roulette: self.roulette[i],
-                most: self.most[i],
-                factor: at(self.factor, i),
-                eta_squared: self.eta_squared[i],
-                active: self.active >> i & 1 == 1,
-                certain: self.certain >> i & 1 == 1,
-            };
-            let vertex = lane(self.surface, self.bsdf, self.throughput, i);
-            let next = scatter(&vertex, &given);
+            let (next, vertex) = self.at(One(i));
             let ([ox, oy, oz], [dx, dy, dz]) = (next.origin, next.direction);
             block.rays[i] = [ox, oy, oz, f32::INFINITY, dx, dy, dz, 0.0];
             let ([r, g, b], [x, y, z]) = (next.throughput, vertex.position);
@@ -196,22 +203,7 @@ impl Kernel for ScatterKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Scatter { surface, bsdf, given, u, roulette, most, throughput, eta_squared, .. } = self.0;
-        let given = ScatterLanes {
-            direction: load3(simd, &given.direction),
-            weight: load3(simd, &given.weight),
-            pdf: simd.load16(&given.pdf),
-            eta: simd.load16(&given.eta),
-            u: [simd.load16(&u[0]), simd.load16(&u[1])],
-            roulette: simd.load16(roulette),
-            most: simd.load16(most),
-            factor: load3(simd, self.0.factor),
-            eta_squared: simd.load16(eta_squared),
-            active: simd.mask16(self.0.active),
-            certain: simd.mask16(self.0.certain),
-        };
-        let vertex = vertices(simd, surface, bsdf, throughput);
-        let next = scatter(&vertex, &given);
+        let (next, vertex) = self.0.at(All(simd));
         let (zero, end) = (simd.splat16(0.0), simd.splat16(f32::INFINITY));
         let ([ox, oy, oz], [dx, dy, dz]) = (next.origin, next.direction);
         let ([r, g, b], [x, y, z]) = (next.throughput, vertex.position);

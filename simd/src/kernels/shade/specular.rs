@@ -3,10 +3,11 @@
 
 use super::bsdf::viewer;
 use super::fresnel::{fresnel, schlick};
+use super::load::{All, Load, One};
 use super::scatter::ScatterBlock;
 use super::surface::SurfaceBlock;
 use super::vector::{self, scale};
-use super::{Row, Row3, at, load3, put};
+use super::{Row, Row3, load3, put};
 use crate::lanes::{Lanes, Mask, Simd};
 use crate::level::{Kernel, Level};
 
@@ -93,6 +94,19 @@ impl<L: Lanes> SpecularLanes<L> {
 }
 
 impl SpecularSamples<'_> {
+    /// Samples over lanes.
+    #[inline(always)]
+    fn at<F: Load>(&self, from: F) -> SampleLanes<F::Lanes> {
+        let Self { surface, specular, lobe } = self;
+        let lanes = SpecularLanes {
+            color: from.row3(&specular.color),
+            eta: from.row(&specular.eta),
+            metal: from.set(specular.metal),
+            dielectric: from.set(specular.dielectric),
+        };
+        lanes.sample(viewer(from.row3(&surface.wo)), from.row(lobe))
+    }
+
     /// Samples by the instructions of `level`, into the lanes of smooth surfaces. Returns the set of samples.
     pub fn compute(&self, level: Level, out: &mut ScatterBlock) -> u32 {
         level.dispatch(SampleKernel(self, out))
@@ -100,16 +114,9 @@ impl SpecularSamples<'_> {
 
     /// Scalar reference; equals [`SpecularSamples::compute`] to the bit where samples exist.
     pub fn reference(&self, out: &mut ScatterBlock) -> u32 {
-        let Self { surface, specular, lobe } = self;
         let mut exists = 0;
-        for i in (0..super::BLOCK).filter(|i| specular.exists >> i & 1 == 1) {
-            let lanes = SpecularLanes {
-                color: at(&specular.color, i),
-                eta: specular.eta[i],
-                metal: specular.metal >> i & 1 == 1,
-                dielectric: specular.dielectric >> i & 1 == 1,
-            };
-            let sample = lanes.sample(viewer(at(&surface.wo, i)), lobe[i]);
+        for i in (0..super::BLOCK).filter(|i| self.specular.exists >> i & 1 == 1) {
+            let sample = self.at(One(i));
             put(&mut out.direction, i, sample.direction);
             put(&mut out.weight, i, sample.weight);
             (out.pdf[i], out.eta[i]) = (f32::INFINITY, sample.eta);
@@ -126,15 +133,8 @@ impl Kernel for SampleKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u32 {
-        let Self(SpecularSamples { surface, specular, lobe }, out) = self;
-        let lanes = SpecularLanes {
-            color: load3(simd, &specular.color),
-            eta: simd.load16(&specular.eta),
-            metal: simd.mask16(specular.metal),
-            dielectric: simd.mask16(specular.dielectric),
-        };
-        let sample = lanes.sample(viewer(load3(simd, &surface.wo)), simd.load16(lobe));
-        let is = simd.mask16(specular.exists);
+        let Self(samples, out) = self;
+        let (sample, is) = (samples.at(All(simd)), simd.mask16(samples.specular.exists));
         let (direction, weight) = (load3(simd, &out.direction), load3(simd, &out.weight));
         out.direction = vector::to_arrays(vector::select(is, sample.direction, direction));
         out.weight = vector::to_arrays(vector::select(is, sample.weight, weight));

@@ -11,6 +11,7 @@ use super::scatter::{NextBlock, Scatter, ScatterBlock};
 use super::sky::{SkyBlock, SkySamples};
 use super::specular::{SpecularBlock, SpecularSamples};
 use super::surface::{SurfaceBlock, Surfaces};
+use super::texture::{MAX_SIZE, TextureBlock};
 use super::{Row, Row3, at, put};
 use crate::Level;
 
@@ -393,6 +394,49 @@ fn environment_samples_agree_with_the_reference_on_every_level() {
         }
     }
     assert!(counts.iter().all(|&count| count > 1000), "{counts:?}");
+}
+
+#[test]
+fn texture_look_ups_agree_with_the_reference_on_every_level() {
+    let mut random = Random(8);
+    for round in 0..400 {
+        let far = [2.0, 100.0, 1e7][round % 3];
+        let mut wanted = TextureBlock {
+            at: [random.row(-far, far), random.row(-1.0, 2.0)],
+            size: [random.row(1.0, 9.0).map(f32::floor), random.row(1.0, 5000.0).map(f32::floor)],
+            clamps: random.bits(),
+            texels: core::array::from_fn(|_| random.vectors()),
+            ..TextureBlock::EMPTY
+        };
+        let wild = [f32::NAN, f32::INFINITY, -1e30, 8_388_607.5, -4_194_304.5, -1e-9, -0.0, 1.0 - 1e-7];
+        wanted.at[0][..8].copy_from_slice(&wild);
+        (wanted.size[0][5], wanted.size[1][6]) = (MAX_SIZE as f32, 1.0);
+        let given = wanted.clone();
+        wanted.surround_reference();
+        let mut mixture = [[0.0; 16]; 3];
+        wanted.mix_reference(&mut mixture);
+        for i in 0..16 {
+            for axis in 0..2 {
+                let (size, weight) = (wanted.size[axis][i], wanted.weight[axis][i]);
+                let (first, second) = (wanted.first[axis][i], wanted.second[axis][i]);
+                let next = if first + 1.0 < size { first + 1.0 } else { 0.0 };
+                let clamps = wanted.clamps >> i & 1 == 1;
+                assert!(first >= 0.0 && first < size && first.fract() == 0.0, "{first} of {size}");
+                assert_eq!(second, if clamps { (first + 1.0).min(size - 1.0) } else { next });
+                assert!((0.0..=1.0).contains(&weight), "{weight}");
+            }
+        }
+        for level in Level::detect().and_below() {
+            let mut found = given.clone();
+            found.surround(level);
+            let bits = |rows: [[Row; 2]; 3]| rows.map(|rows| rows.map(|row| row.map(f32::to_bits)));
+            let places = |block: &TextureBlock| bits([block.first, block.second, block.weight]);
+            assert_eq!(places(&found), places(&wanted), "{level:?}");
+            let mut mixed = [[0.0; 16]; 3];
+            found.mix(level, &mut mixed);
+            assert_eq!(mixed.map(|r| r.map(f32::to_bits)), mixture.map(|r| r.map(f32::to_bits)), "{level:?}");
+        }
+    }
 }
 
 #[test]

@@ -14,6 +14,7 @@ use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
 use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
+use halflight_simd::kernels::shade::texture::TextureBlock;
 use halflight_simd::kernels::shade::{Row, Row3, at};
 
 /// Kernel by name.
@@ -27,6 +28,8 @@ pub(super) struct Kernel {
 pub(super) const KERNELS: &[Kernel] = &[
     Kernel { name: "camera rays", run: |blocks, i, level| blocks.0[i].camera(level) },
     Kernel { name: "surface points", run: |blocks, i, level| blocks.0[i].surface(level) },
+    Kernel { name: "texels around coordinates", run: |blocks, i, level| blocks.0[i].surround(level) },
+    Kernel { name: "mixtures of texels", run: |blocks, i, level| blocks.0[i].mix(level) },
     Kernel { name: "numbers of a vertex", run: |blocks, i, level| blocks.0[i].numbers(level) },
     Kernel { name: "numbers of a light sample", run: |blocks, i, level| blocks.0[i].light_numbers(level) },
     Kernel { name: "near rectangle lights", run: |blocks, i, level| blocks.0[i].light(level) },
@@ -77,6 +80,7 @@ struct Block {
     given: ScatterBlock,
     ones: Row3,
     raster: [Row; 2],
+    textures: TextureBlock,
 }
 
 impl Block {
@@ -155,6 +159,13 @@ impl Block {
             ..SpecularBlock::EMPTY
         };
         let raster = [row(0.0, 640.0), row(0.0, 480.0)];
+        let textures = TextureBlock {
+            at: weights,
+            size: [[512.0; 16]; 2],
+            weight: weights,
+            texels: [corners[0], corners[1], corners[2], ways],
+            ..TextureBlock::EMPTY
+        };
         Self {
             corners,
             weights,
@@ -170,6 +181,7 @@ impl Block {
             given: ScatterBlock::EMPTY,
             ones: [[1.0; 16]; 3],
             raster,
+            textures,
         }
     }
 
@@ -222,6 +234,24 @@ impl Block {
             Some(level) => samples.lights(level, OFFSETS, &mut numbers),
         }
         black_box(&numbers);
+    }
+
+    fn surround(&self, level: Option<Level>) {
+        let mut block = self.textures.clone();
+        match level {
+            None => block.surround_reference(),
+            Some(level) => block.surround(level),
+        }
+        black_box(&block);
+    }
+
+    fn mix(&self, level: Option<Level>) {
+        let mut mixture = self.ones;
+        match level {
+            None => self.textures.mix_reference(&mut mixture),
+            Some(level) => self.textures.mix(level, &mut mixture),
+        }
+        black_box(&mixture);
     }
 
     fn light(&self, level: Option<Level>) {

@@ -7,11 +7,12 @@ use crate::geometry::Ray;
 use crate::light::{ChosenLight, emitted};
 use crate::sampling::Sampler;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::block::{Block, Set, Stages, put_light};
+use crate::transport::path::block::{Block, Stages, put_light};
 use crate::transport::path::estimator::LightEstimator;
 use crate::transport::path::shade::Path;
 use crate::transport::path::sharing::{PathMemory, Sharing};
 use crate::transport::walk::dimension;
+use crate::transport::walk::points::Set;
 use crate::transport::wavefront::{BLOCK, TO_ENVIRONMENT, Wavefront};
 use bytemuck::Zeroable;
 use glam::{Vec2, Vec3};
@@ -32,7 +33,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     ) {
         lit &= !(block.specular.exists | block.smooth_coats);
         let others = lit & !block.in_lanes();
-        block.side = block.surface.frame[2];
+        block.side = block.points.surface.frame[2];
         for i in Set(others) {
             if block.others[i].is_delta() {
                 lit &= !(1 << i);
@@ -80,13 +81,14 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         }
         let environment = self.sample_lights(block, lit);
         for i in Set(others & block.light.exists) {
-            let wi = block.point(i).frame.to_local(at(&block.light.direction, i).into());
-            let (f, pdf) = block.others[i].evaluate::<F>(at(&block.surface.wo, i).into(), wi);
+            let wi = block.points.point(i).frame.to_local(at(&block.light.direction, i).into());
+            let (f, pdf) = block.others[i].evaluate::<F>(at(&block.points.surface.wo, i).into(), wi);
             put(&mut block.value, i, f.to_array());
             block.pdf[i] = pdf;
         }
         if block.coats.exists & block.light.exists != 0 {
-            let Block { surface, coats, light, value, pdf, .. } = &mut *block;
+            let Block { points, coats, light, value, pdf, .. } = &mut *block;
+            let surface = &points.surface;
             CoatLight { surface, coats, tables: &COATS, direction: &light.direction }.compute(
                 self.context.level,
                 value,
@@ -99,7 +101,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 block.light.alone |= u32::from(ends) << i;
             }
         }
-        let Block { surface, bsdf, light, value, pdf, each, throughput, shadows, .. } = &mut *block;
+        let Block { points, bsdf, light, value, pdf, each, throughput, shadows, .. } = &mut *block;
+        let surface = &points.surface;
         Direct { surface, bsdf, light, value, pdf, each, throughput }.compute(self.context.level, shadows);
         let mut none = (E::State::zeroed(), R::State::zeroed());
         for i in Set(block.shadows.exists) {
@@ -107,8 +110,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
                 let Some(Path { shared, .. }) = path else { continue };
                 R::sample_light(shared, || {
-                    let wi = block.point(i).frame.to_local(at(&block.light.direction, i).into());
-                    let (wo, f) = (at(&block.surface.wo, i).into(), at(&block.value, i).into());
+                    let wi = block.points.point(i).frame.to_local(at(&block.light.direction, i).into());
+                    let (wo, f) = (at(&block.points.surface.wo, i).into(), at(&block.value, i).into());
                     block.others[i].base_part(wo, wi, f)
                 });
             }
@@ -138,12 +141,12 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         } else {
             (emitters.triangles, emitters.rectangles, emitters.two_sided) = (0, 0, 0);
         }
-        let places = (&block.surface.position, &block.side);
+        let places = (&block.points.surface.position, &block.side);
         let chosen = lights.choose_block(places, &block.numbers.choice, lit);
         lit &= chosen.as_ref().map_or(lit, |chosen| chosen.exists);
         for i in Set(lit) {
             let (position, side) =
-                (Vec3::from(at(&block.surface.position, i)), Vec3::from(at(&block.side, i)));
+                (Vec3::from(at(&block.points.surface.position, i)), Vec3::from(at(&block.side, i)));
             let chosen = match &chosen {
                 Some(chosen) => lights.chosen(chosen, i),
                 None => match lights.choose(position, side, block.numbers.choice[i]) {
@@ -185,7 +188,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     fn sample_areas(&self, block: &mut Block<'a>, areas: u32) {
         let samples = EmitterSamples {
             lights: &block.emitters,
-            from: &block.surface.position,
+            from: &block.points.surface.position,
             normal: &block.side,
             u: &block.numbers.light,
             probability: &block.probability,

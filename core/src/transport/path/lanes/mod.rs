@@ -10,22 +10,21 @@ mod direct;
 mod scatter;
 
 use super::PathIntegrator;
-use super::block::{Block, Set, Stages};
+use super::block::{Block, Stages};
 use super::estimator::{LightEstimator, PathVertex, RemainingLight};
 use super::shade::{Path, Shading};
 use super::sharing::{PathMemory, Sharing};
-use crate::bsdf::{Bsdf, COATS, Features};
+use crate::bsdf::{COATS, Features};
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
 use crate::transport::walk::dimension;
+use crate::transport::walk::points::Set;
 use crate::transport::wavefront::{BLOCK, Wavefront};
 use bytemuck::Zeroable;
 use core::ops::Range;
-use glam::Vec3;
 use halflight_simd::kernels::shade::put;
-use halflight_simd::kernels::shade::surface::Surfaces;
 
 /// Vertices of a block as an estimator takes them, and the light that it leaves to their paths. None without
 /// an estimator.
@@ -56,25 +55,11 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E
         if hits == 0 {
             return;
         }
-        let mut copies = [Ray::zeroed(); BLOCK];
-        let rays = wave.rays.get(range.start..range.start + BLOCK).unwrap_or_else(|| {
-            let there = &wave.rays[range.clone()];
-            copies.iter_mut().zip(there).for_each(|(copy, ray)| *copy = *ray);
-            &copies
-        });
-        let rays: &[[f32; 8]] = bytemuck::cast_slice(rays);
-        let Some(rays) = rays.first_chunk() else { return };
-        let surfaces = Surfaces {
-            corners: &block.corners,
-            normals: (!context.scene.mesh.normals.is_empty()).then_some(&block.normals),
-            weights: &block.weights,
-            rays,
-        };
-        surfaces.compute(context.level, &mut block.surface);
-        let hits = integrator.complete_points(block, (wave, range.start), hits);
+        let traced = (&wave.rays[range.clone()], &wave.hits[range.clone()]);
+        let hits = block.points.compute(context, traced, hits);
         let mut points = Points { points: [const { None }; BLOCK], found: [E::Found::default(); BLOCK] };
         if !E::ADDS_NOTHING {
-            Set(hits).for_each(|i| points.points[i] = Some(block.point(i)));
+            Set(hits).for_each(|i| points.points[i] = Some(block.points.point(i)));
             let Points { points, found } = &mut points;
             estimator.look_up((context, settings), (wave, range.clone()), points, found, counters);
         }
@@ -111,8 +96,6 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         wave: &mut Wavefront,
         range: Range<usize>,
     ) -> u32 {
-        let scene = self.context.scene;
-        let mesh = &scene.mesh;
         let mut none = (E::State::zeroed(), R::State::zeroed());
         let mut hits = 0;
         for (i, (ray, hit)) in wave.rays[range.clone()].iter().zip(&wave.hits[range]).enumerate() {
@@ -126,58 +109,17 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 self.escape(path, state, ray);
                 continue;
             }
-            let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { continue };
-            let Some(material) = scene.materials.get(triangle.material as usize) else { continue };
-            let [a, b, c] = triangle.vertices;
-            let corner = |vertex: u32| mesh.positions.get(vertex as usize);
-            let (Some(&a), Some(&b), Some(&c)) = (corner(a), corner(b), corner(c)) else { continue };
-            put(&mut block.corners[0], i, a);
-            put(&mut block.corners[1], i, b);
-            put(&mut block.corners[2], i, c);
-            if !mesh.normals.is_empty() {
-                for (rows, vertex) in block.normals.iter_mut().zip(triangle.vertices) {
-                    put(rows, i, mesh.normals.get(vertex as usize).copied().unwrap_or_default());
-                }
+            if !block.points.gather(self.context.scene, i, hit) {
+                continue;
             }
-            (block.weights[0][i], block.weights[1][i]) = (hit.u, hit.v);
             block.eta_squared[i] = path.eta_squared;
             (block.samples.place[i], block.samples.index[i]) =
                 Sampler::place(self.settings.seed, path.pixel, path.sample);
             block.path[i] = ray.tag;
             block.segments[i] = u32::from(path.segments);
-            block.triangle[i] = hit.triangle;
-            block.material[i] = material;
             hits |= 1 << i;
         }
         hits
-    }
-
-    /// Adds texture coordinates, and points of normal maps and degenerate triangles. Returns the set of
-    /// `hits` with a point; their rays start at `first`.
-    #[inline]
-    fn complete_points(&self, block: &mut Block<'a>, (wave, first): (&Wavefront, usize), hits: u32) -> u32 {
-        let scene = self.context.scene;
-        let mut met = hits;
-        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
-            for i in Set(hits) {
-                let t = scene.mesh.corner_texcoords(block.triangle[i]);
-                let (u, v) = (block.weights[0][i], block.weights[1][i]);
-                block.uv[i] = (1.0 - u - v) * t[0] + u * t[1] + v * t[2];
-            }
-        }
-        let mut special = hits & !block.surface.regular;
-        if F::NORMAL_MAPS {
-            let mapped = |i: &usize| block.material[*i].normal_map.is_some();
-            special |= Set(hits).filter(mapped).fold(0, |set, i| set | 1 << i);
-        }
-        for i in Set(special) {
-            let (ray, hit) = (wave.rays[first + i], wave.hits[first + i]);
-            match self.context.surface_at(&ray, &hit) {
-                Some(point) => block.put_point(i, &point, Vec3::from(ray.direction)),
-                None => met &= !(1 << i),
-            }
-        }
-        met
     }
 
     /// Adds emission at the `hits`, whose rays start at `first`, continues behind skipped surfaces, looks up
@@ -198,15 +140,21 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let index = block.path[i] as usize;
             let Some(mut path) = memory.path(wave.paths, index, &mut none) else { continue };
             let ray = wave.rays[first + i];
-            let bsdf = match self.arrive_at(block, i, &mut path, (&ray, &wave.hits[first + i]), counters) {
-                Ok(bsdf) => bsdf,
-                Err(Some(through)) => {
-                    // At most in place of this ray: later ones are still read.
-                    wave.push_ray(index, through);
-                    continue;
-                }
-                Err(None) => continue,
+            let hit = (&ray, &wave.hits[first + i]);
+            if let Err(next) = self.arrive_at(block, i, &mut path, hit, counters) {
+                // At most in place of this ray: later ones are still read.
+                next.into_iter().for_each(|through| wave.push_ray(index, through));
+                continue;
+            }
+            // Not copied: a copy would wait for its fields to be written.
+            let bsdf = block.points.bsdf::<F>(self.context.scene, i);
+            let entered = !path.path.classes.ends_at(&bsdf) && {
+                let Path { path, state, shared } = &mut path;
+                self.enter((path, state, shared), &block.points.point(i), &bsdf).is_ok()
             };
+            if !entered {
+                continue;
+            }
             put(&mut block.throughput, i, path.path.throughput);
             let one = 1 << i;
             if E::ADDS_NOTHING {
@@ -233,7 +181,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             block.put_bsdf::<F>(i, &bsdf, block.segments[i]);
         }
         if block.coats.exists != 0 {
-            block.coats.see(self.context.level, &block.surface, &COATS);
+            block.coats.see(self.context.level, &block.points.surface, &COATS);
         }
         if E::ADDS_NOTHING {
             (stages.lit, stages.onward) = (stages.met, stages.met);
@@ -241,22 +189,22 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         stages
     }
 
-    /// Adds emission at vertex `i`, the `hit` of `ray`, and looks up its BSDF. `Err` if the path does not
-    /// scatter there: the next ray behind a skipped surface, or `None` if the path ends.
+    /// Adds emission at vertex `i`, the `hit` of `ray`. `Err` if the path does not scatter there: the next
+    /// ray behind a skipped surface, or `None` if the path ends.
     #[inline]
     fn arrive_at(
         &self,
         block: &Block<'a>,
         i: usize,
-        Path { path, state, shared }: &mut Path<E::State, R::State>,
+        Path { path, state, .. }: &mut Path<E::State, R::State>,
         (ray, hit): (&Ray, &Hit),
         counters: &mut Counters,
-    ) -> Result<Bsdf, Option<Ray>> {
-        let (segments, triangle) = (block.segments[i], block.triangle[i]);
-        let (material, front) = (block.material[i], block.surface.front >> i & 1 == 1);
+    ) -> Result<(), Option<Ray>> {
+        let (segments, triangle) = (block.segments[i], block.points.triangle[i]);
+        let (material, front) = (block.points.material[i], block.points.is_front(i));
         let is_cutout = F::CUTOUT && material.has_cutout();
         if triangle == path.triangle || is_cutout || segments == 1 && !front {
-            let point = block.point(i);
+            let point = block.points.point(i);
             let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
             let opacity = || sampler.single(dimension::opacity(segments, u32::from(path.crossings)));
             if segments == 1 && point.is_left_by(ray)
@@ -267,16 +215,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             }
         }
         if material.emits() {
-            self.emission(path, state, &block.point(i), ray.direction.into());
+            self.emission(path, state, &block.points.point(i), ray.direction.into());
         }
-        if segments >= self.settings.max_depth {
-            return Err(None);
-        }
-        let bsdf = Bsdf::at::<F>(self.context.scene, material, block.uv[i], front);
-        if path.classes.ends_at(&bsdf) {
-            return Err(None);
-        }
-        self.enter((path, state, shared), &block.point(i), &bsdf)?;
-        Ok(bsdf)
+        if segments >= self.settings.max_depth { Err(None) } else { Ok(()) }
     }
 }

@@ -5,12 +5,13 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, COATS, Diffuse, Features};
 use crate::sampling::Sampler;
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::block::{Block, Set};
+use crate::transport::path::block::Block;
 use crate::transport::path::estimator::LightEstimator;
 use crate::transport::path::shade::Path;
 use crate::transport::path::sharing::{PathMemory, Sharing};
 use crate::transport::settings::Counters;
 use crate::transport::walk::dimension;
+use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
 use crate::transport::wavefront::{BLOCK, Wavefront};
 use bytemuck::Zeroable;
@@ -68,7 +69,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             self.leave((block, memory), wave, &mut sets);
         }
         Scatter {
-            surface: &block.surface,
+            surface: &block.points.surface,
             bsdf: &block.bsdf,
             given: &block.given,
             u: &block.numbers.scatter,
@@ -105,7 +106,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
             let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobe];
-            let wo = at(&block.surface.wo, i).into();
+            let wo = at(&block.points.surface.wo, i).into();
             let Some(sample) = bsdf.sample::<F>(wo, u) else {
                 sets.active &= !(1 << i);
                 continue;
@@ -134,7 +135,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         sets: &mut Sets,
     ) {
         let level = self.context.level;
-        let Block { surface, coats, specular, samples, numbers, given, .. } = &mut *block;
+        let Block { points, coats, specular, samples, numbers, given, .. } = &mut *block;
+        let surface = &points.surface;
         let of_coats = coats.exists & onward;
         if of_coats | specular.exists & onward == 0 {
             return;
@@ -167,7 +169,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 false => {
                     let f = Rgb::from(at(&block.given.weight, i)) * block.given.pdf[i];
                     let wi = at(&block.given.direction, i).into();
-                    block.others[i].base_part(at(&block.surface.wo, i).into(), wi, f)
+                    block.others[i].base_part(at(&block.points.surface.wo, i).into(), wi, f)
                 }
             });
         }
@@ -189,7 +191,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             if block.bsdf.diffuse >> i & 1 == 1 {
                 let reflectance = Rgb::from(at(&block.bsdf.reflectance, i));
                 let throughput = Rgb::from(at(&block.throughput, i)) * reflectance;
-                let surface = (&block.point(i), &Bsdf::Diffuse(Diffuse { reflectance }));
+                let surface = (&block.points.point(i), &Bsdf::Diffuse(Diffuse { reflectance }));
                 let survives = R::leave(shared, surface, throughput, block.segments[i]);
                 sets.certain |= u32::from(survives) << i;
             }
@@ -242,7 +244,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             (path.position, path.eta_squared) = ([x, y, z], eta_squared);
             let [x, y, z, _] = next.normals[i];
             path.normal = if transmits { [0.0; 3] } else { [x, y, z] };
-            path.triangle = block.triangle[i];
+            path.triangle = block.points.triangle[i];
             path.segments += 1;
             wave.push_ray(index, bytemuck::cast(next.rays[i]));
         }

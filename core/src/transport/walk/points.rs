@@ -1,0 +1,273 @@
+//! Surface points of a block of sixteen hits, with the texels of their colours: computed in lanes, with the
+//! bits of [`SurfacePoint::at`] and [`Bsdf::at`]. Normal maps and degenerate triangles are computed one by
+//! one.
+
+use crate::Rgb;
+use crate::bsdf::{Bsdf, Features};
+use crate::geometry::{Frame, Hit, Ray};
+use crate::scene::{Material, Scene, SurfacePoint, load};
+use crate::transport::walk::context::SceneContext;
+use bytemuck::Zeroable;
+use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
+use halflight_simd::kernels::shade::texture::TextureBlock;
+use halflight_simd::kernels::shade::{BLOCK, Row, Row3, at, put};
+
+/// Surface points of a block. Rows of other hits keep old values.
+pub(in crate::transport) struct PointBlock<'a> {
+    corners: [Row3; 3],
+    normals: [Row3; 3],
+    weights: [Row; 2],
+    pub(in crate::transport) surface: SurfaceBlock,
+    pub(in crate::transport) triangle: [u32; BLOCK],
+    pub(in crate::transport) material: [&'a Material; BLOCK],
+    uv: [Vec2; BLOCK],
+    textures: TextureBlock,
+    /// Set of hits whose colours were looked up in lanes, and their texels.
+    textured: u32,
+    texel: Row3,
+    /// Set of hits with a point, by [`SceneContext::met`].
+    met: u32,
+}
+
+static GREY: Material = Material::GREY;
+
+impl<'a> PointBlock<'a> {
+    /// Without points.
+    pub(in crate::transport) fn new() -> Self {
+        Self {
+            corners: [[[0.0; BLOCK]; 3]; 3],
+            normals: [[[0.0; BLOCK]; 3]; 3],
+            weights: [[0.0; BLOCK]; 2],
+            surface: SurfaceBlock::EMPTY,
+            triangle: [0; BLOCK],
+            material: [&GREY; BLOCK],
+            uv: [Vec2::ZERO; BLOCK],
+            textures: TextureBlock::EMPTY,
+            textured: 0,
+            texel: [[0.0; BLOCK]; 3],
+            met: 0,
+        }
+    }
+
+    /// Collects the triangle of `hit` as number `i`. False if the scene has no such triangle.
+    #[inline]
+    pub(in crate::transport) fn gather(&mut self, scene: &Scene<'a>, i: usize, hit: &Hit) -> bool {
+        let (mesh, i) = (&scene.mesh, i & 15);
+        let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
+        let Some(material) = scene.materials.get(triangle.material as usize) else { return false };
+        let [a, b, c] = triangle.vertices;
+        let corner = |vertex: u32| mesh.positions.get(vertex as usize);
+        let (Some(&p0), Some(&p1), Some(&p2)) = (corner(a), corner(b), corner(c)) else { return false };
+        put(&mut self.corners[0], i, p0);
+        put(&mut self.corners[1], i, p1);
+        put(&mut self.corners[2], i, p2);
+        if !mesh.normals.is_empty() {
+            let normal = |vertex: u32| mesh.normals.get(vertex as usize).copied().unwrap_or_default();
+            put(&mut self.normals[0], i, normal(a));
+            put(&mut self.normals[1], i, normal(b));
+            put(&mut self.normals[2], i, normal(c));
+        }
+        (self.weights[0][i], self.weights[1][i]) = (hit.u, hit.v);
+        (self.triangle[i], self.material[i]) = (hit.triangle, material);
+        true
+    }
+
+    /// Computes the points of the `hits` of `rays`, at most sixteen.
+    #[inline]
+    fn meet<F: Features>(&mut self, context: &SceneContext<'a, F>, rays: &[Ray], hits: &[Hit]) {
+        let mut met = 0;
+        for (i, hit) in hits.iter().enumerate() {
+            met |= u32::from(hit.is_some() && self.gather(context.scene, i, hit)) << i;
+        }
+        self.met = if met == 0 { 0 } else { self.compute(context, (rays, hits), met) };
+    }
+
+    /// Computes the points of the gathered set `met` of `hits` of `rays`, at most sixteen. Returns the set of
+    /// hits with a point.
+    #[inline]
+    pub(in crate::transport) fn compute<F: Features>(
+        &mut self,
+        context: &SceneContext<'a, F>,
+        (rays, hits): (&[Ray], &[Hit]),
+        mut met: u32,
+    ) -> u32 {
+        let scene = context.scene;
+        let mut copies = [Ray::zeroed(); BLOCK];
+        let whole: &[Ray] = if rays.len() < BLOCK {
+            copies.iter_mut().zip(rays).for_each(|(copy, ray)| *copy = *ray);
+            &copies
+        } else {
+            rays
+        };
+        let records: &[[f32; 8]] = bytemuck::cast_slice(whole);
+        let Some(records) = records.first_chunk() else { return 0 };
+        let surfaces = Surfaces {
+            corners: &self.corners,
+            normals: (!scene.mesh.normals.is_empty()).then_some(&self.normals),
+            weights: &self.weights,
+            rays: records,
+        };
+        surfaces.compute(context.level, &mut self.surface);
+        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
+            for i in Set(met) {
+                let t = scene.mesh.corner_texcoords(self.triangle[i]);
+                let (u, v) = (self.weights[0][i], self.weights[1][i]);
+                self.uv[i] = (1.0 - u - v) * t[0] + u * t[1] + v * t[2];
+            }
+            if F::TEXTURES {
+                self.look_up_colors(context, met);
+            }
+        }
+        let mut special = met & !self.surface.regular;
+        if F::NORMAL_MAPS {
+            let mapped = |i: &usize| self.material[*i].normal_map.is_some();
+            special |= Set(met).filter(mapped).fold(0, |set, i| set | 1 << i);
+        }
+        for i in Set(special) {
+            let (Some(ray), Some(hit)) = (rays.get(i), hits.get(i)) else { continue };
+            match context.surface_at(ray, hit) {
+                Some(point) => self.put_point(i, &point, Vec3::from(ray.direction)),
+                None => met &= !(1 << i),
+            }
+        }
+        met
+    }
+
+    /// Looks up the textures of the colours at the hits `met`. Their accesses to memory overlap.
+    #[inline]
+    fn look_up_colors<F: Features>(&mut self, context: &SceneContext<'a, F>, met: u32) {
+        let scene = context.scene;
+        self.textured = 0;
+        let mut texels: [(&[[u8; 4]], usize); BLOCK] = [(&[], 0); BLOCK];
+        for i in Set(met) {
+            let id = self.material[i].surface.color().and_then(|color| color.texture);
+            let Some(texture) = id.and_then(|id| scene.textures.get(id.0 as usize)) else { continue };
+            if let Some(found) = texture.put(&mut self.textures, i, self.uv[i]) {
+                texels[i] = found;
+                self.textured |= 1 << i;
+            }
+        }
+        if self.textured != 0 {
+            self.textures.surround(context.level);
+            Set(self.textured).for_each(|i| load(&mut self.textures, i, texels[i]));
+            self.textures.mix(context.level, &mut self.texel);
+        }
+    }
+
+    /// Stores a surface point computed without lanes.
+    fn put_point(&mut self, i: usize, point: &SurfacePoint, direction: Vec3) {
+        let surface = &mut self.surface;
+        put(&mut surface.position, i, point.position.to_array());
+        surface.error[i & 15] = point.error;
+        put(&mut surface.geometric_normal, i, point.geometric_normal.to_array());
+        let Frame { tangent, bitangent, normal } = point.frame;
+        for (rows, axis) in surface.frame.iter_mut().zip([tangent, bitangent, normal]) {
+            put(rows, i, axis.to_array());
+        }
+        put(&mut surface.wo, i, point.frame.to_local(-direction).to_array());
+        surface.front = surface.front & !(1 << i) | u32::from(point.front) << i;
+    }
+
+    /// Surface point of hit `i`.
+    #[inline]
+    pub(in crate::transport) fn point(&self, i: usize) -> SurfacePoint<'a> {
+        let i = i & 15;
+        let Self { surface, .. } = self;
+        let [tangent, bitangent, normal] = &surface.frame;
+        SurfacePoint {
+            position: at(&surface.position, i).into(),
+            error: surface.error[i],
+            geometric_normal: at(&surface.geometric_normal, i).into(),
+            frame: Frame {
+                tangent: at(tangent, i).into(),
+                bitangent: at(bitangent, i).into(),
+                normal: at(normal, i).into(),
+            },
+            uv: self.uv[i],
+            front: self.is_front(i),
+            material: self.material[i],
+            triangle: self.triangle[i],
+        }
+    }
+
+    /// True if the viewer of hit `i` is on the front.
+    #[inline]
+    pub(in crate::transport) fn is_front(&self, i: usize) -> bool {
+        self.surface.front >> (i & 15) & 1 == 1
+    }
+
+    /// BSDF at hit `i`.
+    #[inline]
+    pub(in crate::transport) fn bsdf<F: Features>(&self, scene: &Scene, i: usize) -> Bsdf {
+        let i = i & 15;
+        let texel = (F::TEXTURES && self.textured >> i & 1 == 1).then(|| Rgb::from(at(&self.texel, i)));
+        Bsdf::of_texel::<F>((scene, self.material[i]), texel, self.uv[i], self.is_front(i))
+    }
+}
+
+/// Hit of a block.
+#[derive(Clone, Copy)]
+pub(in crate::transport) struct Met<'p, 'a> {
+    points: &'p PointBlock<'a>,
+    i: usize,
+}
+
+impl<'a> Met<'_, 'a> {
+    /// Its surface point, if there is one.
+    #[inline]
+    pub(in crate::transport) fn point(&self) -> Option<SurfacePoint<'a>> {
+        (self.points.met >> self.i & 1 == 1).then(|| self.points.point(self.i))
+    }
+
+    /// BSDF at the point.
+    #[inline]
+    pub(in crate::transport) fn bsdf<F: Features>(&self, scene: &Scene) -> Bsdf {
+        self.points.bsdf::<F>(scene, self.i)
+    }
+}
+
+/// Set of hits of a block.
+#[derive(Clone, Copy)]
+pub(in crate::transport) struct Set(pub(in crate::transport) u32);
+
+impl Iterator for Set {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let i = self.0.trailing_zeros() as usize;
+        self.0 &= self.0.wrapping_sub(1);
+        (i < BLOCK).then_some(i)
+    }
+}
+
+impl Set {
+    /// Hits whose number in `row` has the property `is`.
+    #[inline(always)]
+    pub(in crate::transport) fn of(row: &[u32; BLOCK], is: impl Fn(u32) -> bool) -> u32 {
+        let mut set = 0;
+        for (i, value) in row.iter().enumerate() {
+            set |= u32::from(is(*value)) << i;
+        }
+        set
+    }
+}
+
+impl<'a, F: Features> SceneContext<'a, F> {
+    /// Hit `i` of `rays`, for one `i` after the other from 0 on. The first of a block computes the points of
+    /// all, so that the rays up to `i` may be replaced.
+    #[inline]
+    pub(in crate::transport) fn met<'p>(
+        &self,
+        points: &'p mut PointBlock<'a>,
+        (rays, hits): (&[Ray], &[Hit]),
+        i: usize,
+    ) -> Met<'p, 'a> {
+        if i.is_multiple_of(BLOCK) {
+            let end = rays.len().min(i + BLOCK);
+            points.meet(self, &rays[i..end], &hits[i..end]);
+        }
+        Met { points, i: i % BLOCK }
+    }
+}
