@@ -2,6 +2,7 @@
 //! comparison with neighbours, neighbour clamping. Pictures of this floor have too much noise to show that
 //! one is missing.
 
+use core::f32::consts::PI;
 use glam::{Vec2, Vec3};
 use halflight_core::Level;
 use halflight_core::bsdf::All;
@@ -14,7 +15,6 @@ use halflight_core::method::irradiance_cache::{CacheSettings, FILLED, Irradiance
 use halflight_core::method::{Loop, RenderContext, RenderState, Round, Shard};
 use halflight_core::transport::{PathSettings, UNLIMITED};
 use halflight_tests::scenes::{TABLE_FLOOR, TABLE_LEG, TABLE_LEGS, metal, table_in_the_sun};
-use std::f32::consts::PI;
 
 const SIZE: u32 = 48;
 
