@@ -202,6 +202,13 @@ pub fn box_from_above(floor: Surface, block: Surface) -> SceneBuffers {
     buffers
 }
 
+/// Centres of the legs of [`table_in_the_sun`] on its floor, along x and z.
+pub const TABLE_LEGS: [[f32; 2]; 4] = [[0.3, 0.4], [0.7, 0.4], [0.3, 0.75], [0.7, 0.75]];
+/// Width of a leg.
+pub const TABLE_LEG: f32 = 0.04;
+/// Height of the floor.
+pub const TABLE_FLOOR: f32 = 0.001;
+
 /// A dim room with a floor of `floor`, on which the thin legs of a table stand in the sun of a spot light.
 pub fn table_in_the_sun(floor: Surface) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.5, 0.7, 0.02), Vec3::new(0.5, 0.0, 0.55), Vec3::Y, 60.0);
@@ -211,10 +218,10 @@ pub fn table_in_the_sun(floor: Surface) -> SceneBuffers {
     let wood = buffers.material(Material::diffuse(Rgb::new(0.7, 0.5, 0.3)));
     buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
     let corners = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
-    buffers.quad(corners.map(|[x, z]| Vec3::new(x, 0.001, z)), floor);
-    for (x, z) in [(0.3, 0.4), (0.7, 0.4), (0.3, 0.75), (0.7, 0.75)] {
-        let low = Vec3::new(x - 0.02, 0.001, z - 0.02);
-        buffers.cuboid(low, low + Vec3::new(0.04, 0.25, 0.04), false, wood);
+    buffers.quad(corners.map(|[x, z]| Vec3::new(x, TABLE_FLOOR, z)), floor);
+    for [x, z] in TABLE_LEGS {
+        let low = Vec3::new(x - 0.5 * TABLE_LEG, TABLE_FLOOR, z - 0.5 * TABLE_LEG);
+        buffers.cuboid(low, low + Vec3::new(TABLE_LEG, 0.25, TABLE_LEG), false, wood);
     }
     buffers.cuboid(Vec3::new(0.26, 0.251, 0.36), Vec3::new(0.74, 0.27, 0.79), false, wood);
     let position = Vec3::new(0.02, 0.5, 0.3);

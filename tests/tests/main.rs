@@ -44,4 +44,5 @@ mod stops;
 mod table;
 mod transport;
 mod transport_analytic;
+mod view_record_limits;
 mod view_records;

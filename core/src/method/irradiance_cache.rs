@@ -331,7 +331,6 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             irradiance,
             photons,
             metric: self.metric,
-            least_pixels: LEAST_PIXELS,
             size: self.size,
             step: &mut *views.step,
         };

@@ -20,6 +20,10 @@ const STRIDE: u32 = 2;
 /// Pixels of a step: those of eight tasks of [`PIXELS`].
 const STEP: usize = 8 * PIXELS;
 
+/// Least radius of a record in pixels. Radii of two pixels, as those of irradiance, would flatten the image
+/// of a small bright surface.
+const LEAST_PIXELS: f32 = 0.5;
+
 /// Gather rays of a record.
 pub const RAYS: usize = SIDE * SIDE;
 
@@ -145,8 +149,6 @@ pub struct ViewPlacement<'p, 'a, F> {
     pub photons: Option<CausticMerging<'p>>,
     /// Error metric.
     pub metric: metric::Settings,
-    /// Least radius of a record, in pixels.
-    pub least_pixels: f32,
     /// Width and height of the picture.
     pub size: [u32; 2],
     /// [`step_points`].
@@ -226,7 +228,7 @@ impl<F: Features> ViewPlacement<'_, '_, F> {
         let gathering = ViewGathering {
             order: (*order, builder.index),
             metric: self.metric,
-            least_pixels: self.least_pixels,
+            least_pixels: LEAST_PIXELS,
             irradiance: self.irradiance,
         };
         let integrator = self.integrator.with_caches([self.irradiance; 2]);

@@ -21,14 +21,16 @@ pub(in crate::cache) const GRADIENT_VARIANCE: f32 = 16.0;
 const MAX_COMPARED: usize = 32;
 
 /// Records of a cache, and the octree over them.
-pub(super) struct Neighbours<'a, 'm> {
+pub(super) struct Neighbours<'a, 'm, P> {
     pub(super) records: &'a mut [Record],
     pub(super) tree: &'a Octree<'m>,
     /// Cosine of the maximum angle between normals.
     pub(super) least_cos: f32,
+    /// True for records, by number, of the same kind of light as the new one.
+    pub(super) is_alike: P,
 }
 
-impl Neighbours<'_, '_> {
+impl<P: Fn(u32, &Record) -> bool> Neighbours<'_, '_, P> {
     /// Compares the extrapolations of a new record and its neighbours. A hemisphere does not show, for
     /// example, a surface that comes into sight a step farther; a neighbour does. A contradiction beyond
     /// noise counts as curvature: both radii shrink to those of this curvature, and the wrong record gets
@@ -41,6 +43,7 @@ impl Neighbours<'_, '_> {
         let mut found = [(0u32, [0.0f32; 2]); MAX_COMPARED];
         let mut count = 0;
         let (records, least_cos) = (&*self.records, self.least_cos);
+        let alike = |index: u32| records.get(index as usize).filter(|other| (self.is_alike)(index, other));
         // Curvatures of the errors of the new record and of the other.
         let mut add = |index: u32, curvatures: [f32; 2]| {
             if curvatures != [0.0; 2]
@@ -53,11 +56,11 @@ impl Neighbours<'_, '_> {
         };
         let this = *new;
         self.tree.at(position, |index| {
-            let other = records.get(index as usize);
+            let other = alike(index);
             add(index, [0.0, other.map_or(0.0, |other| other.contradiction(&this, least_cos))])
         });
         self.tree.around(position, new.extent().max_element(), |index| {
-            let other = records.get(index as usize);
+            let other = alike(index);
             add(index, [other.map_or(0.0, |other| this.contradiction(other, least_cos)), 0.0]);
         });
         for &(index, [of_new, of_other]) in found.iter().take(count) {
@@ -81,7 +84,7 @@ impl Neighbours<'_, '_> {
         let records = &*self.records;
         let mut least = new.radii[0];
         self.tree.around(position, new.radii[0], |index| {
-            if let Some(other) = records.get(index as usize)
+            if let Some(other) = records.get(index as usize).filter(|other| (self.is_alike)(index, other))
                 && let Some(distance) = other.distance_to(position, normal)
             {
                 least = least.min(other.radii[0] + distance);
@@ -93,9 +96,9 @@ impl Neighbours<'_, '_> {
 
     /// Clamps all records around `position` by a record of `radius` there.
     fn clamp_around(&mut self, position: Vec3, normal: Vec3, radius: f32) {
-        let records = &mut *self.records;
+        let Self { records, is_alike, .. } = self;
         self.tree.at(position, |index| {
-            if let Some(other) = records.get_mut(index as usize)
+            if let Some(other) = records.get_mut(index as usize).filter(|other| is_alike(index, other))
                 && let Some(distance) = other.distance_to(position, normal)
             {
                 other.shrink(radius + distance);

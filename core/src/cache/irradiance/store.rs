@@ -254,15 +254,26 @@ impl<'m> IrradianceCache<'m> {
     /// [`IrradianceCache::insert`] with coefficients in `registers` of their own.
     pub fn insert_with(
         &mut self,
+        record: Record,
+        coefficients: Option<(&PooledRecord, &[[u16; 16]])>,
+    ) -> bool {
+        self.insert_among(record, coefficients, |_, _| true)
+    }
+
+    /// [`IrradianceCache::insert_with`] for a record whose neighbours are only those for which
+    /// `is_alike` holds, by number.
+    pub(in crate::cache) fn insert_among(
+        &mut self,
         mut record: Record,
         coefficients: Option<(&PooledRecord, &[[u16; 16]])>,
+        is_alike: impl Fn(u32, &Record) -> bool,
     ) -> bool {
         if self.is_full() {
             self.refused += 1;
             return false;
         }
         let Self { records, tree, least_cos, .. } = self;
-        let mut neighbours = Neighbours { records, tree, least_cos: *least_cos };
+        let mut neighbours = Neighbours { records, tree, least_cos: *least_cos, is_alike };
         neighbours.compare(&mut record);
         neighbours.clamp(&mut record);
         if let Some(slot) = self.records.get_mut(self.used) {

@@ -67,8 +67,7 @@ impl<'m> ViewRecords<'m> {
     }
 
     fn serves(&self, number: u32, record: &Record, point: &QueryPoint, kind: &LobeKind) -> bool {
-        kind.is_aligned(point.normal, record.normal.into())
-            && self.kinds.get(number as usize).is_some_and(|of_record| kind.is_like(of_record))
+        is_alike(self.kinds, (number, record), point.normal, kind)
     }
 
     /// True if a record of the same kind covers the point.
@@ -88,10 +87,13 @@ impl<'m> ViewRecords<'m> {
         (weights > 0.0).then(|| sum / weights)
     }
 
-    /// Inserts a record, compared with its neighbours and clamped by them. Returns whether there was memory.
+    /// Inserts a record, compared with its neighbours of the same kind and clamped by them. Returns whether
+    /// there was memory.
     pub fn insert(&mut self, record: Record, kind: LobeKind) -> bool {
         let number = self.cache.records().len();
-        let is_inserted = self.cache.insert(record);
+        let (kinds, normal) = (&*self.kinds, Vec3::from(record.normal));
+        let is_neighbour = |number, other: &Record| is_alike(kinds, (number, other), normal, &kind);
+        let is_inserted = self.cache.insert_among(record, None, is_neighbour);
         if let Some(slot) = self.kinds.get_mut(number).filter(|_| is_inserted) {
             *slot = kind;
         }
@@ -102,4 +104,10 @@ impl<'m> ViewRecords<'m> {
     pub fn rebuild(&mut self) {
         self.cache.rebuild();
     }
+}
+
+/// True if record `number` has light of lobes of `kind` on surfaces of this `normal`.
+fn is_alike(kinds: &[LobeKind], (number, record): (u32, &Record), normal: Vec3, kind: &LobeKind) -> bool {
+    kind.is_aligned(normal, record.normal.into())
+        && kinds.get(number as usize).is_some_and(|of_record| kind.is_like(of_record))
 }

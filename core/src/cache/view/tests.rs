@@ -4,8 +4,12 @@ use super::lobe::ReflectedRadiance;
 use super::*;
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Conductor};
+use crate::cache::irradiance::{Record, SECTORS};
+use crate::geometry::Bounds;
+use crate::memory::{Arena, Line};
 use crate::sampling::Random;
 use glam::{Vec2, Vec3};
+use std::vec;
 use std::vec::Vec;
 
 fn metal(alpha: f32) -> Bsdf {
@@ -120,4 +124,50 @@ fn gradients_of_a_checkered_wall_are_those_of_brute_force() {
         all.push(libm::sqrtf(errors / size));
     }
     assert!(all.iter().all(|error| *error < 0.05), "{all:?}");
+}
+
+/// Radii of two records at a distance of 0.1, the second of another radiance and with half the radius. They
+/// are compared if an error is `allowed`.
+fn radii_beside(kinds: [LobeKind; 2], normal: Vec3, allowed: f32) -> [f32; 2] {
+    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    let mut lines = vec![Line([0; 64]); ViewRecords::footprint(2).bytes() / 64];
+    let mut records = ViewRecords::new(&bounds, 2, &mut Arena::over(&mut lines)).unwrap();
+    for (i, kind) in kinds.into_iter().enumerate() {
+        let radius = [0.4, 0.2][i];
+        let record = Record {
+            position: [[0.4, 0.5, 0.5], [0.5, 0.5, 0.5]][i],
+            normal: [Vec3::Z, normal][i].to_array(),
+            axis: [1.0, 0.0, 0.0],
+            irradiance: [[1.0; 3], [1.5; 3]][i],
+            radii: [radius; 2],
+            overlap: 1.0,
+            reach: radius,
+            boundary: [u8::MAX; SECTORS],
+            free: [u8::MAX; SECTORS],
+            allowed,
+            ..Record::default()
+        };
+        assert!(records.insert(record, kind));
+    }
+    [0, 1].map(|i: usize| records.records()[i].radii[0])
+}
+
+#[test]
+fn only_records_that_serve_the_same_points_correct_each_other() {
+    let [varnish, metal] = [0, 1].map(|material| LobeKind { material, alpha: 0.1 });
+    let corrected = radii_beside([metal; 2], Vec3::Z, 1e-4);
+    assert!(corrected[0] < 0.2 && corrected[1] < 0.2, "{corrected:?}");
+    assert_eq!(radii_beside([metal, LobeKind { alpha: 0.105, ..metal }], Vec3::Z, 1e-4), corrected);
+    let clamped = radii_beside([metal; 2], Vec3::Z, 0.0);
+    assert!((clamped[0] - 0.3).abs() < 1e-6 && clamped[1] == 0.2, "{clamped:?}");
+    let tilted = Vec3::new(0.0, 0.05, 1.0).normalize();
+    for (kinds, normal) in [
+        ([metal, varnish], Vec3::Z),
+        ([metal, LobeKind { alpha: 0.15, ..metal }], Vec3::Z),
+        ([metal; 2], tilted),
+    ] {
+        for allowed in [0.0, 1e-4] {
+            assert_eq!(radii_beside(kinds, normal, allowed), [0.4, 0.2], "{kinds:?} {normal}");
+        }
+    }
 }
