@@ -12,7 +12,7 @@ use std::fs;
 use std::path::Path;
 
 /// Budgets in samples per pixel.
-const BUDGETS: [u32; 3] = [1, 8, 64];
+const BUDGETS: [u32; 3] = [1, 8, 32];
 
 /// The table as it is today.
 fn table() -> String {
