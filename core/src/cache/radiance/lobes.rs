@@ -243,6 +243,45 @@ pub struct LobeTable<'m> {
     basis: Basis,
     /// Numbers of each lobe.
     nodes: &'m [f32],
+    /// Nodes over alpha that are built.
+    rows: Rows,
+}
+
+/// Range of nodes over alpha.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rows {
+    first: usize,
+    end: usize,
+}
+
+impl Rows {
+    /// All nodes.
+    pub const ALL: Self = Self { first: 0, end: ROUGHNESSES };
+    /// No node.
+    pub const NONE: Self = Self { first: ROUGHNESSES, end: 0 };
+
+    /// Nodes for lobes of roughness `alpha`, which is rounded.
+    pub fn of(alpha: f32) -> Self {
+        const SLACK: f32 = 1e-3;
+        let below = |alpha: f32| split(1.0 - libm::logf(alpha) / libm::logf(ALPHA_MIN), ROUGHNESSES).0;
+        Self { first: below(alpha * (1.0 - SLACK)), end: below(alpha * (1.0 + SLACK)) + 2 }
+    }
+
+    /// Nodes of both and between them.
+    pub fn and(self, other: Self) -> Self {
+        Self { first: self.first.min(other.first), end: self.end.max(other.end) }
+    }
+
+    fn has(self, row: usize) -> bool {
+        (self.first..self.end).contains(&row)
+    }
+}
+
+/// The node below `at` in 0 … 1 of this number of `nodes`, and the weight of the one above it.
+fn split(at: f32, nodes: usize) -> (usize, f32) {
+    let at = at.clamp(0.0, 1.0) * (nodes - 1) as f32;
+    let below = (at as usize).min(nodes - 2);
+    (below, at - below as f32)
 }
 
 /// Numbers of a lobe.
@@ -262,35 +301,47 @@ impl<'m> LobeTable<'m> {
     /// # Errors
     /// [`OutOfMemory`] if the arena has less than the footprint.
     pub fn build(basis: Basis, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        Self::build_with(basis, |_| 1.0, arena)
+        Self::build_rows(basis, None, Rows::ALL, arena)
     }
 
-    /// Table for coats of a dielectric with the index of refraction `eta` in place of F = 1.
+    /// Lobes of roughness between nodes of `rows`; with `eta` those of coats of a dielectric with this index of
+    /// refraction in place of F = 1.
     ///
     /// # Errors
     /// Those of [`LobeTable::build`].
-    pub fn build_dielectric(basis: Basis, eta: f32, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        Self::build_with(basis, |cos| dielectric(cos, eta), arena)
+    pub fn build_rows(
+        basis: Basis,
+        eta: Option<f32>,
+        rows: Rows,
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
+        match eta {
+            Some(eta) => Self::build_with((basis, rows), |cos| dielectric(cos, eta), arena),
+            None => Self::build_with((basis, rows), |_| 1.0, arena),
+        }
     }
 
     fn build_with(
-        basis: Basis,
+        (basis, rows): (Basis, Rows),
         reflectance: impl Fn(f32) -> f32,
         arena: &mut Arena<'m>,
     ) -> Result<Self, OutOfMemory> {
         let nodes: &mut [f32] = arena.slice(ANGLES * ROUGHNESSES * numbers(basis))?;
         let factors = Factors::of(basis);
         for (at, node) in nodes.chunks_exact_mut(numbers(basis)).enumerate() {
+            if !rows.has(at / ANGLES) {
+                continue;
+            }
             let angle = (at % ANGLES) as f32 * ANGLE_MAX / (ANGLES - 1) as f32;
             let alpha =
                 ALPHA_MIN * libm::powf(1.0 / ALPHA_MIN, (at / ANGLES) as f32 / (ROUGHNESSES - 1) as f32);
             Lobe::integrate([angle, alpha], &reflectance, &factors).store(node);
         }
-        Ok(Self { basis, nodes })
+        Ok(Self { basis, nodes, rows })
     }
 
     /// Lobe of a viewer at the cosine `cos` and of roughness `alpha`. `None` for alpha outside of
-    /// [`ALPHA_MIN`] … 1, and for viewers beyond [`ANGLE_MAX`].
+    /// [`ALPHA_MIN`] … 1 and of the rows, and for viewers beyond [`ANGLE_MAX`].
     pub fn lobe(&self, cos: f32, alpha: f32) -> Option<Lobe> {
         // Rounding of the ends.
         const SLACK: f32 = 1e-5;
@@ -300,12 +351,10 @@ impl<'m> LobeTable<'m> {
         if !inside.contains(&angle) || !inside.contains(&roughness) {
             return None;
         }
-        let split = |at: f32, nodes: usize| {
-            let at = at.clamp(0.0, 1.0) * (nodes - 1) as f32;
-            let below = (at as usize).min(nodes - 2);
-            (below, at - below as f32)
-        };
         let ((i, s), (j, t)) = (split(angle, ANGLES), split(roughness, ROUGHNESSES));
+        if !self.rows.has(j) || !self.rows.has(j + 1) {
+            return None;
+        }
         let mut lobe = Lobe::none(self.basis);
         let count = numbers(self.basis);
         for (row, weight) in [(j, 1.0 - t), (j + 1, t)] {

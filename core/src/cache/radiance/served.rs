@@ -13,7 +13,7 @@
 //! c)_k λ_k. With Zernike polynomials it has the degree of the records, and the viewer is moved.
 
 use super::basis::{Basis, DEGREE_MAX, Representation};
-use super::lobes::{Lobe, LobeTable};
+use super::lobes::{Lobe, LobeTable, Rows};
 use super::mirrored_viewer;
 use super::pool::Weights;
 use super::sh::ShRotation;
@@ -147,6 +147,22 @@ fn indices(scene: &Scene) -> [Option<f32>; INDICES_MAX] {
     indices
 }
 
+/// Nodes over alpha that surfaces with a `coat` need.
+fn rows(scene: &Scene, coat: Option<f32>) -> Rows {
+    let surfaces = scene.materials.iter().map(|material| &material.surface);
+    let served = surfaces.filter(|surface| coat_of(surface) == Some(coat));
+    served.fold(Rows::NONE, |rows, surface| {
+        rows.and(match surface {
+            Surface::Conductor { roughness, .. } | Surface::Glossy { roughness, .. }
+                if roughness.texture.is_none() =>
+            {
+                Rows::of(roughness.value * roughness.value)
+            }
+            _ => Rows::ALL,
+        })
+    })
+}
+
 /// True if a surface with Schlick's reflectance may be served.
 fn has_schlick(scene: &Scene) -> bool {
     scene.materials.iter().any(|material| coat_of(&material.surface) == Some(None))
@@ -169,11 +185,12 @@ impl<'m> ServedLobes<'m> {
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
         let representation @ Representation { basis, .. } = settings.representation();
-        let schlick = if has_schlick(scene) { Some(LobeTable::build(basis, arena)?) } else { None };
+        let mut table = |coat| LobeTable::build_rows(basis, coat, rows(scene, coat), arena);
+        let schlick = if has_schlick(scene) { Some(table(None)?) } else { None };
         let mut dielectric = [None; INDICES_MAX];
-        for (table, eta) in dielectric.iter_mut().zip(indices(scene)) {
+        for (slot, eta) in dielectric.iter_mut().zip(indices(scene)) {
             if let Some(eta) = eta {
-                *table = Some((eta, LobeTable::build_dielectric(basis, eta, arena)?));
+                *slot = Some((eta, table(Some(eta))?));
             }
         }
         let mut zonal = [[0.0; ZONAL]; NODES];

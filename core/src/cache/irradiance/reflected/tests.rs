@@ -112,7 +112,7 @@ fn bsdfs() -> [Bsdf; 4] {
 /// Radiance 1: the lobe reflects its albedo, over turned normals as well.
 #[test]
 fn uniform_light_is_reflected_by_the_albedo() {
-    let surfaces = [metal(0.3f32.sqrt()), coat(0.5, Some(1.5))];
+    let surfaces = [metal(0.3f32.sqrt()), coat(0.5, Some(1.5)), coat(0.4f32.sqrt(), Some(1.5))];
     let sky = Sky::new(N, |_| 1.0);
     with_served(&LobeSettings::default(), &surfaces, |served| {
         with_cache(&sky, served.unwrap(), |cache| {
@@ -147,7 +147,7 @@ fn uniform_light_is_reflected_by_the_albedo() {
 #[test]
 fn light_of_the_span_is_reflected_as_by_brute_force() {
     let light = |w: [f32; 3]| 1.0 + w[0] * w[1] * w[1] + 0.5 * w[0];
-    let surfaces = [metal(0.3f32.sqrt()), coat(0.5, Some(1.5))];
+    let surfaces = [metal(0.3f32.sqrt()), coat(0.5, Some(1.5)), coat(0.4f32.sqrt(), Some(1.5))];
     let sky = Sky::new(N, light);
     with_served(&LobeSettings::default(), &surfaces, |served| {
         with_cache(&sky, served.unwrap(), |cache| {
@@ -176,7 +176,7 @@ fn light_of_the_span_is_reflected_as_by_brute_force() {
 #[test]
 fn spherical_harmonics_reflect_as_by_brute_force_over_turned_normals() {
     let light = |w: [f32; 3]| w[2].max(0.0) * w[2] * (1.0 + 0.5 * w[0] - 0.3 * w[1]);
-    let surfaces = [metal(0.3f32.sqrt()), coat(0.5, Some(1.5))];
+    let surfaces = [metal(0.3f32.sqrt()), coat(0.5, Some(1.5)), coat(0.4f32.sqrt(), Some(1.5))];
     let sky = Sky::new(N, light);
     with_served(&LobeSettings::of(Basis::SphericalHarmonics), &surfaces, |served| {
         let served = served.unwrap();

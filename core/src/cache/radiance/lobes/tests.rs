@@ -139,6 +139,22 @@ fn orders_follow_the_tolerance() {
 }
 
 #[test]
+fn rows_hold_the_lobes_of_their_roughness_alone() {
+    let lines = || vec![Line([0; 64]); LobeTable::footprint(Basis::Zernike).bytes() / 64];
+    let (mut few, mut all) = (lines(), lines());
+    let all = LobeTable::build(Basis::Zernike, &mut Arena::over(&mut all)).unwrap();
+    let rows = Rows::of(0.3).and(Rows::of(0.4));
+    let few = LobeTable::build_rows(Basis::Zernike, None, rows, &mut Arena::over(&mut few)).unwrap();
+    for alpha in [0.3, 0.35, 0.4] {
+        let [a, b] = [few, all].map(|table| table.lobe(0.7, alpha).unwrap().turned(Vec2::X).of(0.9));
+        assert_eq!(a, b);
+    }
+    assert!(few.lobe(0.7, 0.15).is_none() && few.lobe(0.7, 1.0).is_none());
+    // All rows are those of both ends.
+    assert_eq!(Rows::of(ALPHA_MIN).and(Rows::of(1.0)), Rows::ALL);
+}
+
+#[test]
 fn lobes_outside_of_the_table_are_none() {
     with_lobes(Basis::Zernike, |table| {
         for (cos, alpha) in
