@@ -304,8 +304,8 @@ impl<'m> LobeTable<'m> {
         Self::build_rows(basis, None, Rows::ALL, arena)
     }
 
-    /// Lobes of roughness between nodes of `rows`; with `eta` those of coats of a dielectric with this index of
-    /// refraction in place of F = 1.
+    /// Lobes of roughness between nodes of `rows`; with `eta` those of coats of a dielectric with this index
+    /// of refraction in place of F = 1.
     ///
     /// # Errors
     /// Those of [`LobeTable::build`].
