@@ -61,6 +61,9 @@ const PHOTONS_FACTOR: f64 = 6.0;
 /// Greatest relMSE of path tracing and of caches: all light is missing.
 const ALL_IS_MISSING: f64 = 1.0;
 
+/// Error of the rest beside records from which on it is as good as missing.
+const MOST_REST: f64 = 0.4;
+
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
 const LEAST_GAIN: f64 = 1.15;
 
@@ -278,7 +281,7 @@ impl Trial {
         // Rare light is that of records or of the rest; the picture lacks a rest that no path would find.
         let [first, second] = light_paths.and_then(|pilot| pilot.of_rest).unwrap_or_default();
         let of_rest = [0.0, first, second];
-        let is_missing = |i: usize| of_rest[i] * self.work[i] >= ALL_IS_MISSING * work;
+        let is_missing = |i: usize| of_rest[i] * self.work[i] >= MOST_REST * work;
         let noise = core::array::from_fn(|i| match i == 0 || is_missing(i) {
             true => self.noise[i] * paths / of_trial,
             false => of_rest[i].max(factor * self.noise[i]),
