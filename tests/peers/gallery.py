@@ -91,7 +91,8 @@ def main():
         reference = KEPT / f"{name}.pfm"
         if not reference.exists():
             render(scene, "--method", truth, "--time", f"{arguments.reference_seconds}s", "--seed", 1000, "-o", reference)
-        exposure = 0.8 / np.quantile(read_pfm(reference), 0.95)
+        right = read_pfm(reference)
+        exposure = 0.8 / np.quantile(right, 0.95)
         rows, curves = [], {}
         with tempfile.TemporaryDirectory() as folder:
             for method in METHODS:
@@ -102,7 +103,7 @@ def main():
                 render(scene, "--method", method, *stop, "--reference", reference, "--report", report, "-o", picture)
                 rows.append(read_pfm(picture))
                 # The last row of the curve may be a round before the end.
-                end = (arguments.seconds, relmse(rows[-1], read_pfm(reference)))
+                end = (arguments.seconds, relmse(rows[-1], right))
                 with open(report / "curve.csv") as file:
                     points = [(float(row["seconds"]), float(row["reference_relmse"])) for row in csv.DictReader(file)]
                 curves[method] = [point for point in points if min(point) > 0 and point[0] < 0.95 * end[0]] + [end]
