@@ -56,7 +56,7 @@ const LIGHT_PATHS_FACTOR: f64 = 2.0;
 
 /// Factor on the predicted errors of path tracing and of a cache with caustic photons: light paths, density
 /// estimates, and noise that sixteen samples of a block do not show.
-const PHOTONS_FACTOR: f64 = 6.0;
+const PHOTONS_FACTOR: f64 = 4.0;
 
 /// Greatest relMSE of path tracing and of caches: all light is missing.
 const ALL_IS_MISSING: f64 = 1.0;
@@ -274,12 +274,11 @@ impl Trial {
     fn predict(&self, work: f64, light_paths: Option<LightPaths>) -> Predictions {
         let of_trial = self.error_of_paths(work);
         // The pilot of light paths finds light that the few paths of the trial miss.
-        let of_pilot =
-            light_paths.and_then(|pilot| pilot.of_paths).map(|product| self.reuse * product / work);
+        let of_pilot = light_paths.map_or(0.0, |pilot| self.reuse * pilot.of_paths / work);
         let factor = if self.has_photons { PHOTONS_FACTOR } else { 1.0 };
-        let paths = (factor * of_trial).max(of_pilot.unwrap_or(0.0).min(ALL_IS_MISSING));
+        let paths = (factor * of_trial).max(of_pilot.min(ALL_IS_MISSING));
         // Rare light is that of records or of the rest; the picture lacks a rest that no path would find.
-        let [first, second] = light_paths.and_then(|pilot| pilot.of_rest).unwrap_or_default();
+        let [first, second] = light_paths.map(|pilot| pilot.of_rest).unwrap_or_default();
         let of_rest = [0.0, first, second];
         let is_missing = |i: usize| of_rest[i] * self.work[i] >= MOST_REST * work;
         let noise = core::array::from_fn(|i| match i == 0 || is_missing(i) {

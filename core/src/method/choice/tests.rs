@@ -18,7 +18,7 @@ const GOAL: Goal = Goal { rays: Some(9e7), samples: None, error: None };
 
 /// Light paths with a tenth of the noise × work of path tracing, whose rare light is the `rest`.
 fn light_paths(rest: f64) -> Option<LightPaths> {
-    Some(LightPaths { product: 10.0, of_paths: Some(100.0), of_rest: Some([rest; 2]) })
+    Some(LightPaths { product: 10.0, of_paths: 100.0, of_rest: [rest; 2] })
 }
 
 #[test]

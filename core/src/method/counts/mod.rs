@@ -8,7 +8,7 @@
 pub mod pilot;
 pub mod prediction;
 
-use self::pilot::Found;
+use self::pilot::{Found, PilotSettings, RESTS};
 use self::prediction::{CANDIDATES, Candidate, Given};
 use super::bidirectional::{Bidirectional, BidirectionalSettings};
 use super::caustics;
@@ -45,7 +45,9 @@ pub struct Choice {
     /// See `noise`.
     pub work: f32,
     /// See [`Found::noise_of_rest`].
-    pub noise_of_rest: [f32; 2],
+    pub noise_of_rest: [f32; RESTS],
+    /// Work of a sample of a pixel by path tracing, in rays.
+    pub work_of_paths: f32,
     /// Reason for the number of light paths.
     pub light_paths: &'static str,
     /// Reason for the number of connections.
@@ -61,13 +63,14 @@ pub fn scratch<F: Features>() -> Footprint {
 }
 
 /// Counts for a picture of `context`, as far as `settings` leave them open, by a pilot with one pixel for
-/// each `part` of the picture; `None` where all are given or memory is too short for a pilot.
+/// each `part` of the picture, which may have caustic photons; `None` where all are given or memory is too short
+/// for a pilot.
 ///
 /// # Errors
 /// [`OutOfMemory`] where the scratch of the executor is smaller than [`scratch`].
 pub fn choose<'a, F: Features>(
     context: &RenderContext<'a>,
-    (settings, part): (&BidirectionalSettings, usize),
+    (settings, part, has_photons): (&BidirectionalSettings, usize, bool),
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
 ) -> Result<Option<Choice>, OutOfMemory> {
@@ -88,8 +91,8 @@ pub fn choose<'a, F: Features>(
     let candidates = Candidate::all(&given);
     let merges = may_merge && merging != Some(false);
     let emission = Bidirectional::<F>::emission(context, (merges, 0), memory, executor)?;
-    let Some(found) = pilot::run::<F>(context, &emission, (&candidates, may_merge, part), memory, executor)?
-    else {
+    let pilot = PilotSettings { part, merging: may_merge, has_photons };
+    let Some(found) = pilot::run::<F>(context, &emission, (&candidates, pilot), memory, executor)? else {
         return Ok(None);
     };
     let without = match may_merge {
@@ -121,11 +124,11 @@ fn structural(context: &RenderContext) -> Option<&'static str> {
 pub struct LightPaths {
     /// Product of light paths with the chosen counts; infinite where they are no choice.
     pub product: f64,
-    /// Product of path tracing; `None` if caustic photons supply light that its paths rarely find.
-    pub of_paths: Option<f64>,
+    /// Product of path tracing, for the light that its caustic photons leave.
+    pub of_paths: f64,
     /// Noise of path tracing for the rest beside records of irradiance, and beside those of lobes, not times
-    /// work; `None` as above.
-    pub of_rest: Option<[f64; 2]>,
+    /// work.
+    pub of_rest: [f64; 2],
 }
 
 impl LightPaths {
@@ -185,7 +188,8 @@ impl Choice {
             gain_of_connections: 1.0,
             noise: 0.0,
             work: 0.0,
-            noise_of_rest: [0.0; 2],
+            noise_of_rest: [0.0; RESTS],
+            work_of_paths: 0.0,
             light_paths: reason,
             connections: without,
             merging: None,
@@ -212,6 +216,7 @@ impl Choice {
             noise,
             work,
             noise_of_rest: found.noise_of_rest,
+            work_of_paths: found.work.of(&Candidate::PATHS),
             light_paths: "they reduce noise for the work by a pilot",
             connections: match counts.connections {
                 0 => "splats alone have less noise for the work by a pilot",
@@ -226,13 +231,14 @@ impl Choice {
         }
     }
 
-    /// Noise × work of the pilot beside path tracing with these `findings`; `None` without a pilot.
-    pub fn products(&self, findings: &Findings) -> Option<LightPaths> {
-        let product = f64::from(self.noise) * f64::from(self.work);
-        let gain = self.gain?;
-        let is_rare = !has_caustic_photons(findings);
-        let of_paths = is_rare.then_some(f64::from(gain) * product);
-        Some(LightPaths { product, of_paths, of_rest: is_rare.then_some(self.noise_of_rest.map(f64::from)) })
+    /// Noise × work of the pilot; `None` without one.
+    pub fn products(&self) -> Option<LightPaths> {
+        let [paths, of_rest @ ..] = self.noise_of_rest.map(f64::from);
+        self.gain.map(|_| LightPaths {
+            product: f64::from(self.noise) * f64::from(self.work),
+            of_paths: paths * f64::from(self.work_of_paths),
+            of_rest,
+        })
     }
 
     /// The choice beside path tracing with its own means, path reuse and caustic photons, by its `findings`.

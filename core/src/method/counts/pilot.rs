@@ -51,10 +51,12 @@ const WEIGHTINGS: usize = 1 + CHOSEN.len();
 const BLOCK: usize = 64;
 const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
-/// Ways to find light: by the counts of each candidate, and by path tracing the rest beside records of
-/// irradiance, and beside those of lobes.
+/// Rests of light: beside caustic photons alone, beside records of irradiance, and beside those of lobes. There
+/// are caustic photons beside records, too.
+pub const RESTS: usize = 3;
+
+/// Ways to find light: by the counts of each candidate, and by path tracing each of the rests.
 const WAYS: usize = CANDIDATES + RESTS;
-const RESTS: usize = 2;
 
 /// Values of the pixels of a tile by each way, one sample less the other.
 const SUMS: usize = WAYS * PIXELS_PER_TILE;
@@ -67,7 +69,7 @@ const LEAST_VARIANCE: f32 = 0.05;
 pub struct Found {
     /// Relative variance of a sample of a pixel with the counts of each candidate, in their order.
     pub noise: [f32; CANDIDATES],
-    /// The same of path tracing, for the rest beside records of irradiance, and beside those of lobes.
+    /// The same of path tracing, for each of the rests.
     pub noise_of_rest: [f32; RESTS],
     /// Work of its techniques.
     pub work: Work,
@@ -131,19 +133,31 @@ fn footprint(tasks: usize, tiles: usize, merging: bool) -> Footprint {
     footprint.and(photons)
 }
 
-/// Runs the pilot of a picture of `context` for `candidates`, whose light paths are those of `emission`, with
-/// one pixel for each `part` of the picture, and with `merging` or without: merges show what other techniques
-/// hardly find, even where no candidate has them. `None` where memory is short or the executor is over.
+/// Settings of a pilot.
+#[derive(Clone, Copy, Debug)]
+pub struct PilotSettings {
+    /// Pixels of the picture for each of the pilot.
+    pub part: usize,
+    /// Whether vertices merge: merges show what other techniques hardly find, even where no candidate has
+    /// them.
+    pub merging: bool,
+    /// Whether the rests have caustic photons beside them.
+    pub has_photons: bool,
+}
+
+/// Runs the pilot of a picture of `context` for `candidates`, whose light paths are those of `emission`.
+/// `None` where memory is short or the executor is over.
 ///
 /// # Errors
 /// [`OutOfMemory`] where the scratch of the executor is smaller than [`scratch`].
 pub fn run<'a, F: Features>(
     context: &RenderContext,
     emission: &EmissionSampler,
-    (candidates, merging, part): (&[Candidate; CANDIDATES], bool, usize),
+    (candidates, settings): (&[Candidate; CANDIDATES], PilotSettings),
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
 ) -> Result<Option<Found>, OutOfMemory> {
+    let PilotSettings { part, merging, has_photons } = settings;
     let context = RenderContext { settings: small(context.settings, part), ..*context };
     let PathSettings { width, height, .. } = context.settings;
     let pixels_per_path = if merging { 1 } else { PIXELS_PER_LIGHT_PATH };
@@ -154,8 +168,8 @@ pub fn run<'a, F: Features>(
     }
     let light_paths = (tasks * PATHS_PER_TASK) as f32 / context.pixels() as f32;
     let counts = Candidate { light_paths, connections: CONNECTIONS, merging: true };
-    let pilot =
-        Pilot::<F> { context, emission, tasks, counts, candidates, features: core::marker::PhantomData };
+    let features = core::marker::PhantomData;
+    let pilot = Pilot::<F> { context, emission, tasks, counts, candidates, has_photons, features };
     memory.lend("pilot", footprint, |_, arena| pilot.run(merging, arena, executor))
 }
 
@@ -166,6 +180,7 @@ struct Pilot<'p, 'a, F> {
     /// Its counts.
     counts: Candidate,
     candidates: &'p [Candidate; CANDIDATES],
+    has_photons: bool,
     features: core::marker::PhantomData<F>,
 }
 

@@ -94,7 +94,7 @@ pub(super) struct Vertex<'v> {
 const CONNECTION: u32 = 1 << 31;
 
 /// Least bit of the [`Rest`] in the tag.
-const REST: u32 = 29;
+const REST: u32 = 27;
 
 /// Shadow rays of a wave, whose tag is the index of their path.
 pub(super) struct Queue<'w> {

@@ -328,7 +328,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             Vertex { point: &point, bsdf: &bsdf, wo, sums, is_first_rough, eta_vcm, is_bent, sampler };
         let before = path.radiance;
         self.merge(path, &vertex);
-        queue.record(Class::Merges, path.history.rest(), path, before);
+        queue.record(Class::Merges, path.history.rest_of_merge(), path, before);
         if !bsdf.is_delta() {
             self.light_sample(path, &vertex, ray.tag, queue);
             if !is_bent {

@@ -35,7 +35,7 @@ pub(super) const SEED: u64 = 0x6269_6469_7265_6374;
 const SHADOW_RAYS: usize = 1024;
 
 /// Least bit of the [`Rest`] in a marked splat.
-const REST: u32 = 30;
+const REST: u32 = 28;
 
 /// The pixel of a marked splat, and the records that do not supply its light.
 pub fn marked(pixel: u32) -> (u32, Rest) {

@@ -2,8 +2,8 @@
 //!
 //! A record supplies the light that leaves its surface where the segment behind it ends at a surface that is
 //! not specular: a record of irradiance at a surface with a base, a record of a lobe at any rough surface.
-//! Light samples find the direct light of the first rough vertex. The [`Rest`] is left to camera paths alone,
-//! as without records: caustics above all.
+//! Light samples find the direct light of the first rough vertex. Caustic photons supply light that comes by
+//! casters alone to its first receiver, a vertex that is no caster. The [`Rest`] is left to camera paths.
 
 use crate::bsdf::Bsdf;
 use bytemuck::{Pod, Zeroable};
@@ -19,19 +19,34 @@ const LAST_HAS_BASE: u32 = 1 << 3;
 /// Records of irradiance, and records of lobes, supply the light of the path.
 const BY_IRRADIANCE: u32 = 1 << 4;
 const BY_LOBES: u32 = 1 << 5;
+/// A receiver was met, and more than one.
+const HAS_RECEIVER: u32 = 1 << 6;
+const HAS_TWO_RECEIVERS: u32 = 1 << 7;
+/// The last vertex is a receiver.
+const LAST_RECEIVES: u32 = 1 << 8;
+/// Casters alone lie between the last vertex and the last receiver, or the emitter of a light subpath.
+const BY_CASTERS: u32 = 1 << 9;
+/// Casters alone lie between the emitter of a light subpath and its first receiver.
+const IS_CAUSTIC: u32 = 1 << 10;
+/// Properties of all vertices.
+const KEPT: u32 =
+    HAS_ROUGH | HAS_TWO | BY_IRRADIANCE | BY_LOBES | HAS_RECEIVER | HAS_TWO_RECEIVERS | IS_CAUSTIC;
 
-/// Records that do not supply the light of a path which light samples do not find either, a set.
+/// Means that do not supply the light of a path which light samples do not find either, a set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rest(u32);
 
 impl Rest {
     /// Number of sets.
-    pub const SETS: u32 = 4;
+    pub const SETS: u32 = 16;
 
     /// Light that records or light samples supply.
     pub(in crate::transport) const NONE: Self = Self(0);
     const BESIDE_IRRADIANCE: u32 = 1;
     const BESIDE_LOBES: u32 = 2;
+    /// Photons supply the light; photons beside records, too.
+    const BY_PHOTONS: u32 = 4;
+    const BY_PHOTONS_BESIDE_RECORDS: u32 = 8;
 
     /// Set number `bits`, modulo [`Rest::SETS`].
     pub(in crate::transport) fn from_bits(bits: u32) -> Self {
@@ -53,6 +68,11 @@ impl Rest {
         self.0 & Self::BESIDE_LOBES != 0
     }
 
+    /// Light that caustic photons supply; `beside_records`, where records supply light, too.
+    pub fn is_of_photons(self, beside_records: bool) -> bool {
+        self.0 & if beside_records { Self::BY_PHOTONS_BESIDE_RECORDS } else { Self::BY_PHOTONS } != 0
+    }
+
     fn without(supplied: u32) -> Self {
         let irradiance = if supplied & BY_IRRADIANCE == 0 { Self::BESIDE_IRRADIANCE } else { 0 };
         let lobes = if supplied & BY_LOBES == 0 { Self::BESIDE_LOBES } else { 0 };
@@ -72,7 +92,12 @@ impl History {
 
     /// With a vertex at `bsdf`, and the light `supplied` by the segment to it.
     fn with(self, bsdf: &Bsdf, supplied: u32) -> Self {
-        let kept = self.0 & (HAS_ROUGH | HAS_TWO | BY_IRRADIANCE | BY_LOBES);
+        let receivers = match bsdf.is_caustic_caster() {
+            true => 0,
+            false if self.has(HAS_RECEIVER) => HAS_TWO_RECEIVERS | LAST_RECEIVES,
+            false => HAS_RECEIVER | LAST_RECEIVES,
+        };
+        let kept = self.0 & KEPT | receivers;
         if bsdf.is_delta() {
             return Self(kept);
         }
@@ -90,40 +115,69 @@ impl History {
 
     /// Camera subpath with a vertex at `bsdf`.
     pub(in crate::transport) fn on_camera_path(self, bsdf: &Bsdf) -> Self {
-        self.with(bsdf, self.of_last())
+        let is_cast = bsdf.is_caustic_caster() && (self.has(LAST_RECEIVES) || self.has(BY_CASTERS));
+        let next = self.with(bsdf, self.of_last());
+        Self(next.0 | if is_cast { BY_CASTERS } else { 0 })
     }
 
     /// Camera subpath that left its last vertex by a specular coat.
     pub(in crate::transport) fn by_coat(self) -> Self {
-        Self(self.0 & !(LAST_HAS_BASE | LAST_IS_ROUGH))
+        Self(self.0 & !(LAST_HAS_BASE | LAST_IS_ROUGH | LAST_RECEIVES))
     }
 
     /// Light subpath with a vertex at `bsdf`.
     pub(in crate::transport) fn on_light_path(self, bsdf: &Bsdf) -> Self {
         let next = self.with(bsdf, 0);
-        if self.has(LAST_IS_ROUGH) { Self(next.0 | next.of_last()) } else { next }
+        let of_last = if self.has(LAST_IS_ROUGH) { next.of_last() } else { 0 };
+        let by_casters = match (self.has(HAS_RECEIVER), bsdf.is_caustic_caster()) {
+            (false, true) => BY_CASTERS,
+            (false, false) if self.has(BY_CASTERS) => IS_CAUSTIC,
+            _ => 0,
+        };
+        Self(next.0 | of_last | by_casters)
     }
 
-    /// Rest of the light of all paths with these vertices and more.
+    /// Rest of light that is a caustic or not.
+    fn rest_of(self, is_caustic: bool) -> Rest {
+        let of_photons = match is_caustic {
+            false => 0,
+            true if self.has(HAS_TWO_RECEIVERS) => Rest::BY_PHOTONS,
+            true => Rest::BY_PHOTONS | Rest::BY_PHOTONS_BESIDE_RECORDS,
+        };
+        Rest(Rest::without(self.0).0 | of_photons)
+    }
+
+    /// Rest of the light of a light subpath.
     pub(in crate::transport) fn rest(self) -> Rest {
-        Rest::without(self.0)
+        self.rest_of(self.has(IS_CAUSTIC))
+    }
+
+    /// Rest of the light of merges at the last vertex of a camera subpath. Their photons may be caustic.
+    pub(in crate::transport) fn rest_of_merge(self) -> Rest {
+        Rest(self.rest_of(true).0 | Rest::BY_PHOTONS_BESIDE_RECORDS)
+    }
+
+    /// Rest of light that comes to the last vertex of a camera subpath straight from an emitter.
+    fn rest_of_emission(self) -> Rest {
+        self.rest_of(self.has(HAS_RECEIVER) && self.has(BY_CASTERS))
     }
 
     /// Rest of the light of an emitter that the last ray of a camera subpath hits.
     pub(in crate::transport) fn rest_of_hit(self) -> Rest {
         let is_direct = !self.has(HAS_TWO) && (!self.has(HAS_ROUGH) || self.has(LAST_IS_ROUGH));
-        if is_direct { Rest::NONE } else { self.rest() }
+        if is_direct { Rest::NONE } else { self.rest_of_emission() }
     }
 
     /// Rest of the light of a light sample at the last vertex of a camera subpath.
     pub(in crate::transport) fn rest_of_sample(self) -> Rest {
-        if self.has(HAS_TWO) { self.rest() } else { Rest::NONE }
+        if self.has(HAS_TWO) { self.rest_of_emission() } else { Rest::NONE }
     }
 
     /// Rest of the light of a connection of the last vertex with the end of a light subpath that has its own
     /// rest.
     pub(in crate::transport) fn rest_of_connection(self, of_light: Rest) -> Rest {
-        Rest(Rest::without(self.0 | self.of_last()).0 & of_light.0)
+        let beside_records = Rest::without(self.0 | self.of_last()).0 & of_light.0;
+        Rest(beside_records | of_light.0 & Rest::BY_PHOTONS)
     }
 }
 
@@ -177,5 +231,26 @@ mod tests {
         assert_eq!(camera(&[mirror()]).rest_of_hit(), Rest::NONE);
         assert_eq!(camera(&[diffuse(), diffuse()]).rest_of_sample(), Rest::NONE);
         assert_eq!(camera(&[diffuse()]).rest_of_connection(light(&[mirror()]).rest()), Rest::NONE);
+    }
+
+    #[test]
+    fn photons_supply_light_that_comes_by_casters_to_its_first_receiver() {
+        let of_photons = |rest: Rest| [false, true].map(|beside_records| rest.is_of_photons(beside_records));
+        let hit = |path: &[Bsdf]| of_photons(camera(path).rest_of_hit());
+        assert_eq!(hit(&[diffuse(), mirror(), mirror()]), [true; 2]);
+        // Records do not supply light from another receiver by a mirror.
+        assert_eq!(hit(&[diffuse(), mirror(), diffuse(), mirror()]), [true, false]);
+        assert_eq!(hit(&[mirror()]), [false; 2]);
+        assert_eq!(hit(&[diffuse(), diffuse()]), [false; 2]);
+        assert_eq!(of_photons(camera(&[diffuse(), mirror(), diffuse()]).rest_of_sample()), [false; 2]);
+        let leaves = |path: &[Bsdf]| of_photons(light(path).rest());
+        assert_eq!(leaves(&[mirror(), diffuse()]), [true; 2]);
+        assert_eq!(leaves(&[mirror(), diffuse(), mirror(), diffuse()]), [true, false]);
+        assert_eq!(leaves(&[diffuse(), mirror(), diffuse()]), [false; 2]);
+        let connected = camera(&[diffuse()]).rest_of_connection(light(&[mirror(), diffuse()]).rest());
+        assert_eq!(of_photons(connected), [true, false]);
+        // The coat of a receiver casts no photons.
+        let coated = camera(&[diffuse()]).by_coat().on_camera_path(&mirror());
+        assert_eq!(of_photons(coated.rest_of_hit()), [false; 2]);
     }
 }

@@ -33,7 +33,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
         let techniques = choice.settings(&given, &setup.context());
         return Ok(Attempt::Ready(light_paths_with::<F>(&techniques, setup, memory, method)?));
     }
-    match choose::<F>(setup, memory, (&given, pilot::PART))? {
+    match choose::<F>(setup, memory, (&given, pilot::PART, false))? {
         None => Ok(Attempt::Ready(light_paths_with::<F>(&given, setup, memory, method)?)),
         Some(choice) if choice.gain.is_none() && choice.counts.light_paths > 0.0 => {
             Ok(Attempt::Instead(Plan::with_counts(method, choice).into()))
@@ -83,7 +83,7 @@ fn light_paths_with<'a: 'm, 'm, F: Features>(
 pub(super) fn choose<F: Features>(
     setup: &RenderSetup,
     memory: &mut Memory,
-    (given, part): (&BidirectionalSettings, usize),
+    (given, part, has_photons): (&BidirectionalSettings, usize, bool),
 ) -> Result<Option<Choice>, RenderError> {
     let workers = setup.workers;
     let scratch = counts::scratch::<F>();
@@ -94,7 +94,7 @@ pub(super) fn choose<F: Features>(
     let mut own = memory.within(&bank);
     let mut scratch = own.take_each("pilot paths", scratch, workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);
-    let choice = counts::choose::<F>(&setup.context(), (given, part), &mut own, &mut executor)?;
+    let choice = counts::choose::<F>(&setup.context(), (given, part, has_photons), &mut own, &mut executor)?;
     memory.release(&own);
     Ok(choice)
 }

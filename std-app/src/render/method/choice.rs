@@ -42,13 +42,16 @@ pub(super) fn choose<'a, F: Features>(
     let techniques = BidirectionalSettings { merging, ..settings.bidirectional };
     let is_audited = settings.audit.is_none_or(|share| share > 0.0);
     let light_paths = match trial.affords_light_paths(&goal) {
-        true => bidirectional::choose::<F>(setup, memory, (&techniques, trial.part_of_pilot(&goal)))?,
+        true => {
+            let part = trial.part_of_pilot(&goal);
+            bidirectional::choose::<F>(setup, memory, (&techniques, part, trial.has_photons))?
+        }
         false => None,
     };
     let findings = paths.findings();
     // Merges are biased, as caches are.
     let light_paths = light_paths.filter(|choice| is_audited || !choice.counts.merging);
-    let products = light_paths.and_then(|choice| choice.products(&findings));
+    let products = light_paths.and_then(|choice| choice.products());
     let light_paths = light_paths.map(|choice| choice.beside(&findings));
     let is_choice = light_paths.is_some_and(|choice| choice.counts.light_paths > 0.0);
     let products = products.map(|found| if is_choice { found } else { found.of_others() });

@@ -1,6 +1,8 @@
 //! Sums of the pilot over blocks of pixels: noise and work of all candidates.
 
-use super::{BLOCK, Block, CONNECTIONS, Found, LEAST_VARIANCE, LIST, Pilot, SAMPLE, WEIGHTINGS, Weighting};
+use super::{
+    BLOCK, Block, CONNECTIONS, Found, LEAST_VARIANCE, LIST, Pilot, RESTS, SAMPLE, WEIGHTINGS, Weighting,
+};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::PIXELS_PER_TILE;
@@ -14,7 +16,14 @@ impl<F: Features> Pilot<'_, '_, F> {
     fn ways(&self) -> impl Iterator<Item = (Candidate, fn(Rest) -> bool)> {
         let all: fn(Rest) -> bool = |_| true;
         let candidates = self.candidates.iter().map(move |candidate| (*candidate, all));
-        let rests = [Rest::is_beside_irradiance as fn(Rest) -> bool, Rest::is_beside_lobes];
+        let rests: [fn(Rest) -> bool; RESTS] = match self.has_photons {
+            false => [all, Rest::is_beside_irradiance, Rest::is_beside_lobes],
+            true => [
+                |rest| !rest.is_of_photons(false),
+                |rest| rest.is_beside_irradiance() && !rest.is_of_photons(true),
+                |rest| rest.is_beside_lobes() && !rest.is_of_photons(true),
+            ],
+        };
         candidates.chain(rests.map(|is_found| (Candidate::PATHS, is_found)))
     }
 
