@@ -13,7 +13,7 @@ pub use goal::Goal;
 
 use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::caustics::{self, CausticPathTracing};
-use super::counts::{self, LightPaths, pilot};
+use super::counts::{self, PilotNoise, pilot};
 use super::executor::{Executor, Passed};
 use super::{RenderContext, work_of_detail};
 use crate::Rgb;
@@ -57,12 +57,6 @@ const LIGHT_PATHS_FACTOR: f64 = 2.0;
 /// Factor on the predicted errors of path tracing and of a cache with caustic photons: light paths, density
 /// estimates, and noise that sixteen samples of a block do not show.
 const PHOTONS_FACTOR: f64 = 4.0;
-
-/// Greatest relMSE of path tracing and of caches: all light is missing.
-const ALL_IS_MISSING: f64 = 1.0;
-
-/// Error of the rest beside records from which on it is as good as missing.
-const MOST_REST: f64 = 0.4;
 
 /// Least ratio of predicted errors for which a method takes the place of path tracing.
 const LEAST_GAIN: f64 = 1.15;
@@ -160,9 +154,16 @@ struct Predictions {
     paths: f64,
     /// Noise of a sample of all light, and of that which no record supplies, for each of [`SUPPLIES`].
     noise: [f64; SUPPLIES],
-    /// Error of a picture without the rare light that no path would find, 0 if there is none.
-    missing: f64,
     light_paths: f64,
+}
+
+/// Pilot of light paths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPaths {
+    /// Noise and work that it has found.
+    pub noise: PilotNoise,
+    /// Whether light paths are a choice.
+    pub are_choice: bool,
 }
 
 /// Working memory of a worker.
@@ -271,26 +272,30 @@ impl Trial {
     }
 
     /// Errors after so much work for each pixel.
-    fn predict(&self, work: f64, light_paths: Option<LightPaths>) -> Predictions {
+    fn predict(&self, work: f64, found: Option<LightPaths>) -> Predictions {
         let of_trial = self.error_of_paths(work);
-        // The pilot of light paths finds light that the few paths of the trial miss.
-        let of_pilot = light_paths.map_or(0.0, |pilot| self.reuse * pilot.of_paths / work);
         let factor = if self.has_photons { PHOTONS_FACTOR } else { 1.0 };
-        let paths = (factor * of_trial).max(of_pilot.min(ALL_IS_MISSING));
-        // Rare light is that of records or of the rest; the picture lacks a rest that no path would find.
-        let [first, second] = light_paths.map(|pilot| pilot.of_rest).unwrap_or_default();
-        let of_rest = [0.0, first, second];
-        let is_missing = |i: usize| of_rest[i] * self.work[i] >= MOST_REST * work;
-        let noise = core::array::from_fn(|i| match i == 0 || is_missing(i) {
-            true => self.noise[i] * paths / of_trial,
-            false => of_rest[i].max(factor * self.noise[i]),
+        // The pilot of light paths finds light that the few paths of the trial miss.
+        let samples_of = |rays: f32| work / f64::from(rays);
+        let of_pilot = found.map(|LightPaths { noise, .. }| {
+            let samples = samples_of(noise.work_of_paths) / self.reuse;
+            noise.rests[0].error(samples, self.pixels)
         });
-        Predictions {
-            paths,
-            noise,
-            missing: if is_missing(IRRADIANCE) { ALL_IS_MISSING } else { 0.0 },
-            light_paths: light_paths.map_or(f64::INFINITY, |pilot| LIGHT_PATHS_FACTOR * pilot.product / work),
-        }
+        let paths = (factor * of_trial).max(of_pilot.unwrap_or(0.0));
+        // Rare light is that of records or of the rest.
+        let noise = core::array::from_fn(|i| match (i, found) {
+            (0, _) => self.noise[0] * paths / of_trial,
+            (_, None) => factor * self.noise[i],
+            (_, Some(LightPaths { noise, .. })) => {
+                let samples = work / self.work[i];
+                (factor * self.noise[i]).max(samples * noise.rests[i].error(samples, self.pixels))
+            }
+        });
+        let light_paths =
+            found.filter(|found| found.are_choice).map_or(f64::INFINITY, |LightPaths { noise, .. }| {
+                noise.light_paths.error(samples_of(noise.work) / LIGHT_PATHS_FACTOR, self.pixels)
+            });
+        Predictions { paths, noise, light_paths }
     }
 
     /// Pixels of the picture for each of the pilot of light paths: few where time alone ends the picture. A
@@ -322,12 +327,12 @@ impl Trial {
             return (Best::Paths, Finding::new("method", Used, "paths show no noise"));
         }
         let work = self.budget(goal);
-        let Predictions { paths, noise, missing, light_paths } = self.predict(work, light_paths);
+        let Predictions { paths, noise, light_paths } = self.predict(work, light_paths);
         let [(first, cache), (second, radiance_cache)] =
             [(IRRADIANCE, may_have_cache), (RADIANCE, may_have_cache && self.has_lobes)].map(
                 |(supply, is_choice)| {
                     let (picture, error) = self.cached(supply, work, &noise);
-                    (picture, if is_choice { error.min(ALL_IS_MISSING) } else { f64::INFINITY })
+                    (picture, if is_choice { error } else { f64::INFINITY })
                 },
             );
         let cached = cache.min(radiance_cache);
@@ -335,10 +340,10 @@ impl Trial {
             () if paths <= LEAST_GAIN * cached.min(light_paths) => {
                 (Best::Paths, "path tracing has the least error")
             }
-            () if cached.max(missing) <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
+            () if cached <= light_paths && cache <= LEAST_GAIN_OF_LOBES * radiance_cache => {
                 (Best::Cache(first), "an irradiance cache has less error than path tracing")
             }
-            () if cached.max(missing) <= light_paths => {
+            () if cached <= light_paths => {
                 (Best::RadianceCache(second), "records of rough reflections have less error than paths")
             }
             () => (Best::LightPaths, "light paths have less error than paths alone"),

@@ -1,6 +1,7 @@
 //! Tests of the choice by predicted error.
 
 use super::*;
+use crate::method::counts::rarity::Rarity;
 
 const TRIAL: Trial = Trial {
     noise: [4.0, 0.1, 0.1],
@@ -17,8 +18,14 @@ const TRIAL: Trial = Trial {
 const GOAL: Goal = Goal { rays: Some(9e7), samples: None, error: None };
 
 /// Light paths with a tenth of the noise × work of path tracing, whose rare light is the `rest`.
-fn light_paths(rest: f64) -> Option<LightPaths> {
-    Some(LightPaths { product: 10.0, of_paths: 100.0, of_rest: [rest; 2] })
+fn light_paths(rest: f32) -> Option<LightPaths> {
+    let [light_paths, paths, rest] = [2.0, 20.0, rest].map(Rarity::often);
+    let noise = PilotNoise { light_paths, work: 5.0, rests: [paths, rest, rest], work_of_paths: 5.0 };
+    Some(LightPaths { noise, are_choice: true })
+}
+
+fn without(found: Option<LightPaths>) -> Option<LightPaths> {
+    found.map(|found| LightPaths { are_choice: false, ..found })
 }
 
 #[test]
@@ -29,9 +36,9 @@ fn rare_light_is_that_of_records_or_stays_with_paths() {
     assert!(is_cache(best(light_paths(0.05))), "records have the rare light");
     assert_eq!(best(light_paths(20.0)), Best::LightPaths, "caustics are left to paths");
     // The noise of path tracing is the same where light paths are no choice.
-    let others = light_paths(20.0).map(LightPaths::of_others);
+    let others = without(light_paths(20.0));
     assert_eq!(best(others), Best::Paths);
-    assert!(is_cache(best(light_paths(0.05).map(LightPaths::of_others))));
+    assert!(is_cache(best(without(light_paths(0.05)))));
 }
 
 #[test]

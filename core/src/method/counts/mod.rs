@@ -7,9 +7,11 @@
 
 pub mod pilot;
 pub mod prediction;
+pub mod rarity;
 
 use self::pilot::{Found, PilotSettings, RESTS};
 use self::prediction::{CANDIDATES, Candidate, Given};
+use self::rarity::Rarity;
 use super::bidirectional::{Bidirectional, BidirectionalSettings};
 use super::caustics;
 use super::{Executor, RenderContext};
@@ -40,14 +42,8 @@ pub struct Choice {
     pub gain: Option<f32>,
     /// Noise × work of the best counts without connections, path tracing included, over that of the best.
     pub gain_of_connections: f32,
-    /// Relative variance of a sample of a pixel, and its work in rays, by the pilot; 0 without light paths.
-    pub noise: f32,
-    /// See `noise`.
-    pub work: f32,
-    /// See [`Found::noise_of_rest`].
-    pub noise_of_rest: [f32; RESTS],
-    /// Work of a sample of a pixel by path tracing, in rays.
-    pub work_of_paths: f32,
+    /// Noise and work by the pilot.
+    pub noise: PilotNoise,
     /// Reason for the number of light paths.
     pub light_paths: &'static str,
     /// Reason for the number of connections.
@@ -119,23 +115,18 @@ fn structural(context: &RenderContext) -> Option<&'static str> {
     }
 }
 
-/// Noise × work by the pilot: relative variance of a sample of a pixel, times its rays.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightPaths {
-    /// Product of light paths with the chosen counts; infinite where they are no choice.
-    pub product: f64,
-    /// Product of path tracing, for the light that its caustic photons leave.
-    pub of_paths: f64,
-    /// Noise of path tracing for the rest beside records of irradiance, and beside those of lobes, not times
-    /// work.
-    pub of_rest: [f64; 2],
-}
-
-impl LightPaths {
-    /// The same, where light paths are no choice.
-    pub fn of_others(self) -> Self {
-        Self { product: f64::INFINITY, ..self }
-    }
+/// Noise and work of a picture, by the pilot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PilotNoise {
+    /// Noise of light paths with the chosen counts.
+    pub light_paths: Rarity,
+    /// Rays of a sample of a pixel with the chosen counts.
+    pub work: f32,
+    /// Noise of path tracing: all light that its caustic photons leave, the rest beside records of irradiance,
+    /// and that beside records of lobes.
+    pub rests: [Rarity; RESTS],
+    /// Rays of a sample of a pixel by path tracing.
+    pub work_of_paths: f32,
 }
 
 /// Finding on `topic`, if the part is used.
@@ -161,8 +152,8 @@ impl Choice {
         let light_paths = finding("light_paths", has_light_paths, self.light_paths)
             .with("per_pixel", number(counts.light_paths))
             .with_some("gain", self.gain.map(number))
-            .with_some("noise", has_light_paths.then_some(number(self.noise)))
-            .with_some("work", has_light_paths.then_some(number(self.work)));
+            .with_some("noise", has_light_paths.then_some(number(self.noise.light_paths.noise())))
+            .with_some("work", has_light_paths.then_some(number(self.noise.work)));
         let connections = finding("connections", counts.connections > 0, self.connections)
             .with("per_vertex", Value::Count(counts.connections.into()));
         let merging = self.merging.map(|reason| finding("merging", counts.merging, reason));
@@ -186,10 +177,7 @@ impl Choice {
             counts: Candidate::PATHS,
             gain: None,
             gain_of_connections: 1.0,
-            noise: 0.0,
-            work: 0.0,
-            noise_of_rest: [0.0; RESTS],
-            work_of_paths: 0.0,
+            noise: PilotNoise::default(),
             light_paths: reason,
             connections: without,
             merging: None,
@@ -200,23 +188,23 @@ impl Choice {
     /// seen.
     fn by_pilot(found: &Found, candidates: &[Candidate; CANDIDATES], merging: Option<&'static str>) -> Self {
         let products = || {
-            candidates.iter().zip(found.noise).map(|(counts, noise)| (noise * found.work.of(counts), counts))
+            let with =
+                |(counts, found_with): (_, Rarity)| (found_with.noise() * found.work.of(counts), counts);
+            candidates.iter().zip(found.candidates).map(with)
         };
         let best = products().enumerate().skip(1).min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
         let best = best.map_or(1, |(index, _)| index);
         let unconnected = products().filter(|(_, counts)| counts.connections == 0);
         let unconnected = unconnected.map(|(product, _)| product).fold(f32::INFINITY, f32::min);
-        let (counts, noise) = (candidates[best], found.noise[best]);
-        let work = found.work.of(&counts);
-        let alone = found.noise[0] * found.work.of(&Candidate::PATHS);
+        let (counts, light_paths) = (candidates[best], found.candidates[best]);
+        let (work, work_of_paths) = (found.work.of(&counts), found.work.of(&Candidate::PATHS));
+        let product = light_paths.noise() * work;
+        let alone = found.candidates[0].noise() * work_of_paths;
         Self {
             counts,
-            gain: Some(if alone > 0.0 { alone / (noise * work) } else { 0.0 }),
-            gain_of_connections: if unconnected > 0.0 { unconnected / (noise * work) } else { 0.0 },
-            noise,
-            work,
-            noise_of_rest: found.noise_of_rest,
-            work_of_paths: found.work.of(&Candidate::PATHS),
+            gain: Some(if alone > 0.0 { alone / product } else { 0.0 }),
+            gain_of_connections: if unconnected > 0.0 { unconnected / product } else { 0.0 },
+            noise: PilotNoise { light_paths, work, rests: found.rests, work_of_paths },
             light_paths: "they reduce noise for the work by a pilot",
             connections: match counts.connections {
                 0 => "splats alone have less noise for the work by a pilot",
@@ -229,16 +217,6 @@ impl Choice {
                 false => Some("it costs more than it gains by a pilot"),
             },
         }
-    }
-
-    /// Noise × work of the pilot; `None` without one.
-    pub fn products(&self) -> Option<LightPaths> {
-        let [paths, of_rest @ ..] = self.noise_of_rest.map(f64::from);
-        self.gain.map(|_| LightPaths {
-            product: f64::from(self.noise) * f64::from(self.work),
-            of_paths: paths * f64::from(self.work_of_paths),
-            of_rest,
-        })
     }
 
     /// The choice beside path tracing with its own means, path reuse and caustic photons, by its `findings`.

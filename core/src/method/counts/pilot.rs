@@ -9,6 +9,7 @@ mod blocks;
 
 use self::blocks::weigh;
 use super::prediction::{CANDIDATES, CHOSEN, Candidate, Weighed, Work};
+use super::rarity::{Rarity, RaritySums};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Splat, Tile};
 use crate::light::EmissionSampler;
@@ -67,10 +68,10 @@ const LEAST_VARIANCE: f32 = 0.05;
 /// Result of a pilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// Relative variance of a sample of a pixel with the counts of each candidate, in their order.
-    pub noise: [f32; CANDIDATES],
-    /// The same of path tracing, for each of the rests.
-    pub noise_of_rest: [f32; RESTS],
+    /// Noise with the counts of each candidate, in their order.
+    pub candidates: [Rarity; CANDIDATES],
+    /// Noise of path tracing, for each of the rests.
+    pub rests: [Rarity; RESTS],
     /// Work of its techniques.
     pub work: Work,
     /// Fraction of the light that merges bring.
@@ -87,8 +88,9 @@ struct Block {
     merged: f32,
     /// Shadow rays of connections.
     connections: f32,
-    /// Variance and second moment by each way.
-    variance: [f32; WAYS],
+    /// Variance and light by each way.
+    ways: [RaritySums; WAYS],
+    /// Second moment by each way.
     square: [f32; WAYS],
 }
 
@@ -309,8 +311,8 @@ impl<F: Features> Pilot<'_, '_, F> {
             for place in (0..PIXELS_PER_TILE).filter(|place| pixels.pixel(*place).is_some()) {
                 let block = &mut blocks[place / BLOCK];
                 block.pixels += 1.0;
-                for (variance, sums) in block.variance.iter_mut().zip(sums.chunks(PIXELS_PER_TILE)) {
-                    *variance += 0.5 * sums[place] * sums[place];
+                for (way, sums) in block.ways.iter_mut().zip(sums.chunks(PIXELS_PER_TILE)) {
+                    way.add_often(0.5 * sums[place] * sums[place]);
                 }
             }
         }

@@ -97,6 +97,8 @@ pub struct Reweighted {
     pub value: f32,
     /// Expected sum of their squares.
     pub square: f32,
+    /// Their expected number.
+    pub likelihood: f32,
 }
 
 impl Weighed {
@@ -136,9 +138,10 @@ impl Weighed {
     /// With other counts, whose `ratios` are those of [`Candidate::ratios`].
     pub fn with(&self, ratios: &[f32; CLASSES]) -> Reweighted {
         let sum: f32 = self.shares.iter().zip(ratios).map(|(share, ratio)| share * ratio).sum();
-        let reweighted = self.value() / sum.max(LEAST);
+        let likelihood = sum.max(LEAST);
+        let reweighted = self.value() / likelihood;
         let own = ratios[self.contribution.class() as usize];
-        Reweighted { value: reweighted * own, square: self.value() * reweighted }
+        Reweighted { value: reweighted * own, square: self.value() * reweighted, likelihood }
     }
 }
 
@@ -263,7 +266,7 @@ mod tests {
             let ratios = candidate.ratios(&PILOT);
             let (mut value, mut square) = (0.0, 0.0);
             for weighed in &samples {
-                let Reweighted { value: v, square: s } = weighed.with(&ratios);
+                let Reweighted { value: v, square: s, .. } = weighed.with(&ratios);
                 (value, square) = (value + f64::from(v), square + f64::from(s));
             }
             let mut counts = COUNTS;
@@ -282,7 +285,8 @@ mod tests {
         let weighed = Weighed::new(contribution, [2.0, 2.0, 2.0]);
         assert_eq!(weighed.shares, [0.0, 0.0, 0.0, 1.0]);
         assert!(weighed.with(&Candidate::PATHS.ratios(&PILOT)).square >= 1e6);
-        assert_eq!(weighed.with(&PILOT.ratios(&PILOT)), Reweighted { value: 2.0, square: 4.0 });
+        let same = Reweighted { value: 2.0, square: 4.0, likelihood: 1.0 };
+        assert_eq!(weighed.with(&PILOT.ratios(&PILOT)), same);
     }
 
     #[test]

@@ -11,7 +11,8 @@ use halflight_core::findings::Finding;
 use halflight_core::method::Method as _;
 use halflight_core::method::bidirectional::BidirectionalSettings;
 use halflight_core::method::caustics::CausticPathTracing;
-use halflight_core::method::choice::{Best, Trial, TrialCaches};
+use halflight_core::method::choice::{Best, LightPaths, Trial, TrialCaches};
+use halflight_core::method::counts::Choice;
 
 /// Outcome of a choice: the plan of another method, and the reason.
 pub(super) struct Chosen<'a, F> {
@@ -51,11 +52,11 @@ pub(super) fn choose<'a, F: Features>(
     let findings = paths.findings();
     // Merges are biased, as caches are.
     let light_paths = light_paths.filter(|choice| is_audited || !choice.counts.merging);
-    let products = light_paths.and_then(|choice| choice.products());
     let light_paths = light_paths.map(|choice| choice.beside(&findings));
-    let is_choice = light_paths.is_some_and(|choice| choice.counts.light_paths > 0.0);
-    let products = products.map(|found| if is_choice { found } else { found.of_others() });
-    let (best, finding) = trial.best(&goal, is_audited && may_have_cache(setup), products);
+    let found = light_paths.filter(|choice| choice.gain.is_some());
+    let found =
+        found.map(|Choice { noise, counts, .. }| LightPaths { noise, are_choice: counts.light_paths > 0.0 });
+    let (best, finding) = trial.best(&goal, is_audited && may_have_cache(setup), found);
     let instead = match (best, light_paths) {
         (Best::Paths, _) | (Best::LightPaths, None) => None,
         (Best::Cache(picture), _) => Some(Plan::with_cache(Method::IrradianceCache, picture)),

@@ -7,6 +7,7 @@ use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::PIXELS_PER_TILE;
 use crate::method::counts::prediction::{CANDIDATES, Candidate, Reweighted, Weighed, Work};
+use crate::method::counts::rarity::Rarity;
 use crate::transport::Counters;
 use crate::transport::bidirectional::contribution::{Class, Contribution, Rest};
 use crate::transport::bidirectional::light_pass::{PATHS_PER_TASK, marked};
@@ -47,10 +48,11 @@ impl<F: Features> Pilot<'_, '_, F> {
         {
             let ratios = candidate.ratios(&self.counts);
             for weighed in weighed.iter().filter(|weighed| is_found(weighed.rest())) {
-                let Reweighted { value, square } = weighed.with(&ratios);
+                let Reweighted { value, square, likelihood } = weighed.with(&ratios);
                 let block = &mut blocks[weighed.place() / BLOCK];
                 let is_sum = weighed.is_merge() && candidate.merging;
-                block.variance[i] += if is_sum { 0.0 } else { SAMPLE * (square - value * value) };
+                let variance = if is_sum { 0.0 } else { square - value * value };
+                block.ways[i].add(likelihood, SAMPLE, weighed.value(), variance);
                 block.square[i] += SAMPLE * square;
                 sums[weighed.place()] += sign * value;
             }
@@ -84,9 +86,9 @@ impl<F: Features> Pilot<'_, '_, F> {
         let block = &mut blocks[place / BLOCK];
         block.light += SAMPLE * base;
         for (i, (candidate, _)) in self.ways().enumerate().filter(|(_, (_, is_found))| is_found(rest)) {
-            let square = SAMPLE * weighed.with(&candidate.ratios(&self.counts)).square;
-            block.variance[i] += square;
-            block.square[i] += square;
+            let Reweighted { square, likelihood, .. } = weighed.with(&candidate.ratios(&self.counts));
+            block.ways[i].add(likelihood, SAMPLE, base, square);
+            block.square[i] += SAMPLE * square;
         }
     }
 
@@ -94,17 +96,20 @@ impl<F: Features> Pilot<'_, '_, F> {
         let of = |value: &dyn Fn(&Block) -> f32| blocks.iter().map(value).sum::<f32>();
         let pixels = of(&|block| block.pixels);
         let mean = of(&|block| block.light) / pixels;
-        let relative = |block: &Block| {
+        let scale = |block: &Block| {
             let level = block.light / block.pixels;
-            let scale = level * level + 0.01 * mean * mean;
-            if block.pixels > 0.0 && scale > 0.0 { 1.0 / (pixels * scale) } else { 0.0 }
+            level * level + 0.01 * mean * mean
         };
-        let noise_of = |way: usize| {
-            let variance = of(&|block| relative(block) * block.variance[way]);
-            let square = of(&|block| relative(block) * block.square[way]);
-            variance.max(LEAST_VARIANCE * square)
+        let rarity = |way: usize| {
+            let (mut rarity, mut square) = (Rarity::default(), 0.0);
+            for block in blocks.iter().filter(|block| block.pixels > 0.0 && scale(block) > 0.0) {
+                rarity.add(&block.ways[way], block.pixels, scale(block));
+                square += block.square[way] / scale(block);
+            }
+            rarity.over(pixels, LEAST_VARIANCE * square / pixels)
         };
-        let noise = core::array::from_fn(noise_of);
+        let candidates = core::array::from_fn(rarity);
+        let rests = core::array::from_fn(|rest| rarity(CANDIDATES + rest));
         let samples = pixels / SAMPLE;
         let connections = of(&|block| block.connections);
         let light_paths = (self.tasks * PATHS_PER_TASK) as f32 / SAMPLE;
@@ -116,7 +121,7 @@ impl<F: Features> Pilot<'_, '_, F> {
             splats: light.shadow_rays as f32 / light_paths,
         };
         let merged = of(&|block| block.merged) / of(&|block| block.light).max(f32::MIN_POSITIVE);
-        Found { noise, noise_of_rest: core::array::from_fn(|i| noise_of(CANDIDATES + i)), work, merged }
+        Found { candidates, rests, work, merged }
     }
 }
 
