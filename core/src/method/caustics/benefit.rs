@@ -3,6 +3,7 @@
 //! Photons pay in two cases: they carry much of the light; or they carry a little of it that path tracing
 //! finds so rarely that it would be most of the noise, such as the caustic of a small glass in a large room.
 
+use super::photons::PATHS_PER_SAMPLE;
 use crate::transport::Pilot;
 use crate::transport::caustics::tracer::{BLOCKS, GuideSample};
 use core::f64::consts::PI;
@@ -10,17 +11,16 @@ use core::f64::consts::PI;
 /// Least fraction of the picture's light for which photons pay, of light that path tracing finds badly.
 const LEAST_SHARE: f64 = 3.5e-2;
 
-/// Least relative variance of that light by path tracing alone, over that of all other light, for which
-/// photons pay as well, and the fraction of light paths that the camera must see then: few photons are noise
-/// too.
+/// Least relative variance of that light by path tracing alone, over that of all other light and over that of
+/// the photons, for which photons pay as well.
 const LEAST_NOISE: f64 = 0.5;
-const LEAST_VISIBLE: f64 = 0.2;
+const LEAST_GAIN: f64 = 2.0;
 
-/// The parts of these limits from which on a first test is undecided. The test finds a half to twice the
-/// share, and a tenth of the visible paths as long as it has not learned which of many lights matter; half of
-/// that once more, as its sample is small.
+/// The part of the least share from which on a first test is undecided, and the fraction of light paths that the
+/// camera sees then. The test finds a half to twice the share, and a tenth of the visible paths as long as it has
+/// not learned which of many lights matter.
 const DOUBT_SHARE: f64 = 0.25;
-const DOUBT_VISIBLE: f64 = 0.0625;
+const DOUBT_VISIBLE: f64 = 0.0125;
 
 /// Samples of a picture, and how often its paths must find light for this light to be noise. Light that is
 /// found less often is missing.
@@ -66,6 +66,8 @@ pub(super) struct Benefit {
     pub(super) visible: f64,
     /// Relative variance of a sample of their light by path tracing alone.
     noise: f64,
+    /// The same by photons.
+    noise_of_photons: f64,
     /// Its part that is too rare for a pilot.
     rare: f64,
     /// Fraction of the light that path tracing never finds.
@@ -150,7 +152,10 @@ impl Benefit {
         let rare = over_blocks(&|block| relative(block.rare, block));
         let missing = over_blocks(&|block| block.missing);
         let missing = if missing > 0.0 { missing / (mean + radiance) } else { 0.0 };
-        Self { share, visible, noise, rare, missing, mean }
+        // The light of a pixel is that of the photons in its disc.
+        let photons = visible * PATHS_PER_SAMPLE * disc;
+        let noise_of_photons = if photons > 0.0 { share * share / photons } else { 0.0 };
+        Self { share, visible, noise, noise_of_photons, rare, missing, mean }
     }
 
     /// The photon budget, relative to the usual one. The relative variance of photons is that of the few
@@ -162,21 +167,17 @@ impl Benefit {
 
     /// True if more light paths may find that photons pay.
     pub(super) fn may_pay(&self) -> bool {
-        self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= DOUBT_VISIBLE * LEAST_VISIBLE
+        self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= DOUBT_VISIBLE
     }
 
-    /// True if photons may pay; `None` where that depends on the noise of the picture, for
-    /// [`Benefit::pays_beside`].
-    pub(super) fn pays(&self) -> Option<bool> {
-        if self.share >= LEAST_SHARE {
-            return Some(true);
-        }
-        (self.visible < LEAST_VISIBLE).then_some(false)
+    /// True if photons may pay by their share of the light alone.
+    pub(super) fn pays(&self) -> bool {
+        self.share >= LEAST_SHARE
     }
 
     /// True if photons may pay in a picture whose samples have the relative variance `noise`.
     pub(super) fn pays_beside(&self, noise: f64) -> bool {
-        self.noise >= LEAST_NOISE * noise
+        self.noise >= LEAST_NOISE * noise && self.noise >= LEAST_GAIN * self.noise_of_photons
     }
 
     /// Variance and work of path tracing alone, whose `pilot` ran with path reuse or not, for a comparison
@@ -219,7 +220,16 @@ mod tests {
     #[test]
     fn the_photon_budget_grows_with_their_share_of_the_light() {
         let budget = |share| {
-            Benefit { share, visible: 1.0, noise: 0.0, rare: 0.0, missing: 0.0, mean: 1.0 }.photon_budget()
+            Benefit {
+                share,
+                visible: 1.0,
+                noise: 0.0,
+                noise_of_photons: 0.0,
+                rare: 0.0,
+                missing: 0.0,
+                mean: 1.0,
+            }
+            .photon_budget()
         };
         // A caustic beside a lamp, as many as ever; a room behind glass; and a lamp in a bulb.
         assert_eq!([0.0, 0.05, 0.28].map(budget), [1.0; 3]);
@@ -255,15 +265,33 @@ mod tests {
     }
 
     #[test]
-    fn photons_pay_for_much_light_or_for_noise_that_many_of_them_reduce() {
-        let benefit =
-            |share, visible| Benefit { share, visible, noise: 1.0, rare: 0.0, missing: 0.0, mean: 1.0 };
-        assert_eq!(benefit(0.04, 0.0).pays(), Some(true));
-        assert_eq!(benefit(0.03, 0.1).pays(), Some(false));
-        assert_eq!(benefit(0.03, 0.3).pays(), None);
-        assert!(benefit(0.03, 0.3).pays_beside(1.9) && !benefit(0.03, 0.3).pays_beside(2.1));
-        assert!(
-            benefit(0.01, 0.0).may_pay() && benefit(0.0, 0.02).may_pay() && !benefit(0.001, 0.01).may_pay()
-        );
+    fn photons_pay_for_much_light_or_for_noise_that_they_reduce() {
+        let benefit = |share, noise, noise_of_photons| Benefit {
+            share,
+            visible: 1.0,
+            noise,
+            noise_of_photons,
+            rare: 0.0,
+            missing: 0.0,
+            mean: 1.0,
+        };
+        assert!(benefit(0.04, 1.0, 1.0).pays() && !benefit(0.03, 1.0, 0.0).pays());
+        assert!(benefit(0.03, 1.0, 0.4).pays_beside(1.9));
+        assert!(!benefit(0.03, 1.0, 0.4).pays_beside(2.1));
+        assert!(!benefit(0.03, 1.0, 0.6).pays_beside(1.9));
+        let may_pay = |share, visible| Benefit { visible, ..benefit(share, 0.0, 0.0) }.may_pay();
+        assert!(may_pay(0.01, 0.0) && may_pay(0.0, 0.02) && !may_pay(0.001, 0.01));
+    }
+
+    #[test]
+    fn noise_of_photons_falls_with_their_number() {
+        let noise = |hidden: usize| {
+            let mut found = std::vec![path(0.0, 0.0, 0.0); hidden];
+            found.push(path(3.0, 0.1, 7.0));
+            let benefit = Benefit::new(&mut found, 1.0, PIXELS, 0.01);
+            benefit.noise_of_photons / (benefit.share * benefit.share)
+        };
+        assert!((noise(0) - 2.0 / PI).abs() < 1e-9);
+        assert!((noise(9) - 20.0 / PI).abs() < 1e-9);
     }
 }

@@ -16,7 +16,7 @@ use crate::transport::{CausticMerging, LightEstimator, PathIntegrator, RadiusSch
 
 /// Light paths of a map for each pixel of the picture and each sample that the map serves, with the usual
 /// photon budget; at least and at most.
-const PATHS_PER_SAMPLE: f64 = 0.5;
+pub(super) const PATHS_PER_SAMPLE: f64 = 0.5;
 const FEWEST_PATHS: usize = 16 * PATHS_PER_TASK;
 const MOST_PATHS: usize = 4096 * PATHS_PER_TASK;
 

@@ -10,7 +10,7 @@ use crate::method::path::PathTracing;
 use crate::method::{Executor, RenderContext, pilot};
 use crate::photon::Photons;
 use crate::transport::caustics::tracer::{GuideSample, PATHS_PER_TASK};
-use crate::transport::{CausticMerging, RadiusSchedule};
+use crate::transport::{CausticMerging, RadiusSchedule, SuppliedLobes};
 
 /// Light paths of the first test, which ends the prepass where there is next to nothing to find, and of each
 /// later step; where memory is short, fewer, but no fewer than those of the test.
@@ -169,12 +169,21 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         pilot::mean_radiance_without_photons(&integrator, *executor)
     }
 
+    /// True if photons may pay. Records supply indirect light without its noise.
     fn pays(&mut self, benefit: &Benefit) -> Result<bool, OutOfMemory> {
-        if let Some(pays) = benefit.pays() {
-            return Ok(pays);
+        if benefit.pays() {
+            return Ok(true);
         }
-        let pilot = self.paths.variance(benefit.mean as f32, self.light_paths.executor)?;
-        Ok(benefit.pays_beside(pilot.noise(self.paths.reuse().used)))
+        let LightPaths { beside_records, ref mut executor, .. } = self.light_paths;
+        let mean = benefit.mean as f32;
+        let noise = match beside_records {
+            false => self.paths.variance(mean, *executor)?.noise(self.paths.reuse().used),
+            true => {
+                let paths = self.paths.integrator().without_cached_light(SuppliedLobes::default());
+                pilot::variance(&paths, mean, *executor)?.noise(false)
+            }
+        };
+        Ok(benefit.pays_beside(noise))
     }
 }
 
