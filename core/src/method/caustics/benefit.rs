@@ -16,11 +16,12 @@ const LEAST_SHARE: f64 = 3.5e-2;
 const LEAST_NOISE: f64 = 0.5;
 const LEAST_GAIN: f64 = 2.0;
 
-/// The part of the least share from which on a first test is undecided, and the fraction of light paths that the
-/// camera sees then. The test finds a half to twice the share, and a tenth of the visible paths as long as it has
-/// not learned which of many lights matter.
+/// Least fraction of light paths that the camera sees, for photons that pay by noise.
+const LEAST_VISIBLE: f64 = 0.0125;
+
+/// The part of the least share from which on a first test is undecided. The test finds a half to twice the share,
+/// and a tenth of the visible paths as long as it has not learned which of many lights matter.
 const DOUBT_SHARE: f64 = 0.25;
-const DOUBT_VISIBLE: f64 = 0.0125;
 
 /// Samples of a picture, and how often its paths must find light for this light to be noise. Light that is
 /// found less often is missing.
@@ -167,7 +168,7 @@ impl Benefit {
 
     /// True if more light paths may find that photons pay.
     pub(super) fn may_pay(&self) -> bool {
-        self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= DOUBT_VISIBLE
+        self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= LEAST_VISIBLE
     }
 
     /// True if photons may pay by their share of the light alone.
@@ -177,7 +178,8 @@ impl Benefit {
 
     /// True if photons may pay in a picture whose samples have the relative variance `noise`.
     pub(super) fn pays_beside(&self, noise: f64) -> bool {
-        self.noise >= LEAST_NOISE * noise && self.noise >= LEAST_GAIN * self.noise_of_photons
+        let least = (LEAST_NOISE * noise).max(LEAST_GAIN * self.noise_of_photons);
+        self.visible >= LEAST_VISIBLE && self.noise >= least
     }
 
     /// Variance and work of path tracing alone, whose `pilot` ran with path reuse or not, for a comparison

@@ -47,6 +47,8 @@ impl Rest {
     /// Photons supply the light; photons beside records, too.
     const BY_PHOTONS: u32 = 4;
     const BY_PHOTONS_BESIDE_RECORDS: u32 = 8;
+    /// An emitter that is seen directly, or by specular vertices alone.
+    const SEEN: Self = Self(Self::BY_PHOTONS_BESIDE_RECORDS);
 
     /// Set number `bits`, modulo [`Rest::SETS`].
     pub(in crate::transport) fn from_bits(bits: u32) -> Self {
@@ -66,6 +68,11 @@ impl Rest {
     /// Light that records of lobes do not supply either.
     pub fn is_beside_lobes(self) -> bool {
         self.0 & Self::BESIDE_LOBES != 0
+    }
+
+    /// Light of an emitter that is seen directly, or by specular vertices alone: it is noise at edges alone.
+    pub fn is_seen(self) -> bool {
+        self == Self::SEEN
     }
 
     /// Light that caustic photons supply; `beside_records`, where records supply light, too.
@@ -164,8 +171,12 @@ impl History {
 
     /// Rest of the light of an emitter that the last ray of a camera subpath hits.
     pub(in crate::transport) fn rest_of_hit(self) -> Rest {
-        let is_direct = !self.has(HAS_TWO) && (!self.has(HAS_ROUGH) || self.has(LAST_IS_ROUGH));
-        if is_direct { Rest::NONE } else { self.rest_of_emission() }
+        let is_direct = !self.has(HAS_TWO) && self.has(LAST_IS_ROUGH);
+        match self.has(HAS_ROUGH) {
+            false => Rest::SEEN,
+            true if is_direct => Rest::NONE,
+            true => self.rest_of_emission(),
+        }
     }
 
     /// Rest of the light of a light sample at the last vertex of a camera subpath.
@@ -228,7 +239,7 @@ mod tests {
             assert_eq!(camera(direct).rest_of_sample(), Rest::NONE);
             assert_eq!(camera(direct).rest_of_hit(), Rest::NONE);
         }
-        assert_eq!(camera(&[mirror()]).rest_of_hit(), Rest::NONE);
+        assert!(camera(&[mirror()]).rest_of_hit().is_seen());
         assert_eq!(camera(&[diffuse(), diffuse()]).rest_of_sample(), Rest::NONE);
         assert_eq!(camera(&[diffuse()]).rest_of_connection(light(&[mirror()]).rest()), Rest::NONE);
     }
@@ -240,7 +251,6 @@ mod tests {
         assert_eq!(hit(&[diffuse(), mirror(), mirror()]), [true; 2]);
         // Records do not supply light from another receiver by a mirror.
         assert_eq!(hit(&[diffuse(), mirror(), diffuse(), mirror()]), [true, false]);
-        assert_eq!(hit(&[mirror()]), [false; 2]);
         assert_eq!(hit(&[diffuse(), diffuse()]), [false; 2]);
         assert_eq!(of_photons(camera(&[diffuse(), mirror(), diffuse()]).rest_of_sample()), [false; 2]);
         let leaves = |path: &[Bsdf]| of_photons(light(path).rest());

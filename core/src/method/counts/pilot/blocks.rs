@@ -47,7 +47,8 @@ impl<F: Features> Pilot<'_, '_, F> {
             self.ways().zip(sums.chunks_mut(PIXELS_PER_TILE)).enumerate()
         {
             let ratios = candidate.ratios(&self.counts);
-            for weighed in weighed.iter().filter(|weighed| is_found(weighed.rest())) {
+            let counts = |weighed: &&Weighed| !weighed.rest().is_seen() && is_found(weighed.rest());
+            for weighed in weighed.iter().filter(counts) {
                 let Reweighted { value, square, likelihood } = weighed.with(&ratios);
                 let block = &mut blocks[weighed.place() / BLOCK];
                 let is_sum = weighed.is_merge() && candidate.merging;
