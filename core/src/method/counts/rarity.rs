@@ -25,6 +25,11 @@ fn class(likelihood: f32) -> usize {
     (CLASSES as i32 - 1 + exponent.div_euclid(OCTAVES)).clamp(0, CLASSES as i32 - 1) as usize
 }
 
+/// True if light that is found `likelihood` times as often as by a pilot is not rare: an eighth at least.
+pub fn is_often(likelihood: f32) -> bool {
+    class(likelihood) >= CLASSES - 2
+}
+
 impl RaritySums {
     /// Adds a contribution of `light` with its `variance`, whose paths are found `likelihood` times as often as
     /// by the pilot; `weight` of all three.
@@ -109,6 +114,7 @@ mod tests {
     fn classes_have_three_octaves() {
         let classes = [4.0, 1.0, 0.999, 0.125, 0.124, 1e-6, 0.0].map(class);
         assert_eq!(classes, [7, 7, 6, 6, 5, 0, 0]);
+        assert!(is_often(0.125) && !is_often(0.124));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::PIXELS_PER_TILE;
 use crate::method::counts::prediction::{CANDIDATES, Candidate, Reweighted, Weighed, Work};
-use crate::method::counts::rarity::Rarity;
+use crate::method::counts::rarity::{Rarity, is_often};
 use crate::transport::Counters;
 use crate::transport::bidirectional::contribution::{Class, Contribution, Rest};
 use crate::transport::bidirectional::light_pass::{PATHS_PER_TASK, marked};
@@ -52,10 +52,17 @@ impl<F: Features> Pilot<'_, '_, F> {
                 let Reweighted { value, square, likelihood } = weighed.with(&ratios);
                 let block = &mut blocks[weighed.place() / BLOCK];
                 let is_sum = weighed.is_merge() && candidate.merging;
-                let variance = if is_sum { 0.0 } else { square - value * value };
+                // A rare sample that the pilot has by chance is no measure of the variance.
+                let is_often = is_often(likelihood);
+                let variance = match is_sum {
+                    true => 0.0,
+                    false => square - if is_often { value * value } else { 0.0 },
+                };
                 block.ways[i].add(likelihood, SAMPLE, weighed.value(), variance);
                 block.square[i] += SAMPLE * square;
-                sums[weighed.place()] += sign * value;
+                if is_sum || is_often {
+                    sums[weighed.place()] += sign * value;
+                }
             }
         }
     }
