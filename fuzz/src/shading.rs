@@ -140,7 +140,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let mut samples = SampleBlock::EMPTY;
     for i in 0..16 {
         (samples.place[i], samples.index[i], samples.dimension[i]) =
-            (input.arbitrary()?, input.arbitrary()?, input.arbitrary()?);
+            (input.arbitrary()?, input.arbitrary()?, input.arbitrary::<u32>()? >> 1);
     }
     let offsets = Offsets { light: 0, choice: 1, scatter: 2, roulette: 4 };
     let raster = [rows.row(), rows.row()];

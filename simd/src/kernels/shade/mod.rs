@@ -17,6 +17,7 @@ mod load;
 pub mod numbers;
 pub mod rectangle;
 pub mod scatter;
+mod sequences;
 pub mod sky;
 pub mod specular;
 pub mod surface;
