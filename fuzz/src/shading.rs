@@ -5,6 +5,7 @@ use arbitrary::{Result, Unstructured};
 use halflight_simd::Level;
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::choice::{ChoiceBlock, Choices};
 use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
 use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
@@ -139,7 +140,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let mut samples = SampleBlock::EMPTY;
     for i in 0..16 {
         (samples.place[i], samples.index[i], samples.dimension[i]) =
-            (input.arbitrary()?, input.arbitrary()?, input.arbitrary()?);
+            (input.arbitrary()?, input.arbitrary()?, input.arbitrary::<u32>()? >> 1);
     }
     let offsets = Offsets { light: 0, choice: 1, scatter: 2, roulette: 4 };
     let raster = [rows.row(), rows.row()];
@@ -173,6 +174,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     check_coats(&mut rows, input.arbitrary()?, &surface, &coats, &specular);
     check_sky(&mut rows, active, flags & 2 == 0);
     check_textures(&mut rows, flags);
+    check_choices(&mut rows);
     for level in Level::detect().and_below() {
         let mut found = SurfaceBlock::EMPTY;
         surfaces.compute(level, &mut found);
@@ -234,6 +236,24 @@ fn check_sky(rows: &mut Rows, active: u32, is_map: bool) {
         assert_eq!(samples.compute(level, &mut found.0, &mut found.1), set, "{level:?}");
         check("sky direction", 0xffff, &found.0, &direction);
         check("sky density", 0xffff, &[found.1], &[pdf]);
+    }
+}
+
+/// Chosen groups at every level against their scalar reference.
+fn check_choices(rows: &mut Rows) {
+    let weight = |x: f32| if x > 0.0 { x.min(1e30) } else { 0.0 };
+    let columns: [Row; 8] = core::array::from_fn(|_| rows.row().map(weight));
+    let weights = core::array::from_fn(|i| columns.map(|column| column[i]));
+    let u = rows.unit();
+    let choices = Choices { weights: &weights, u: &u };
+    let wanted = choices.reference();
+    for level in Level::detect().and_below() {
+        let mut found = ChoiceBlock::EMPTY;
+        choices.compute(level, &mut found);
+        assert_eq!(found.exists, wanted.exists, "{level:?}");
+        check("group", wanted.exists, &[found.group], &[wanted.group]);
+        check("probability", wanted.exists, &[found.probability], &[wanted.probability]);
+        check("remainder", wanted.exists, &[found.rest], &[wanted.rest]);
     }
 }
 

@@ -9,9 +9,9 @@ pub(super) use build::Item;
 
 use crate::Level;
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use halflight_simd::kernels::shade::choice::{ChoiceBlock, Choices, choose, ends};
 use halflight_simd::kernels::shade::{self, BLOCK, Row, Row3};
 use halflight_simd::{Kernel, Simd};
 use importance::{GROUPS, LightBounds, LightBounds8};
@@ -170,22 +170,8 @@ impl Kernel for SampleKernel<'_> {
 /// [0, 1).
 #[inline(always)]
 fn step<S: Simd>(simd: S, node: &Node, point: Vec3, normal: Vec3, u: f32) -> Option<(u32, f32, f32)> {
-    let weights = node.groups.importance(simd, point, normal);
-    let ends = ends(&weights);
-    let sum = ends[GROUPS - 1];
-    let wanted = u * sum;
-    // Without a branch, which would be mispredicted most of the time.
-    let mut i = 0;
-    for end in &ends {
-        i += usize::from(*end <= wanted);
-    }
-    if i == GROUPS {
-        // No light reaches the point, or rounding exceeds the last light that does.
-        i = weights.iter().rposition(|weight| *weight > 0.0)?;
-    }
-    let before = if i == 0 { 0.0 } else { ends[i - 1] };
-    let rest = ((wanted - before) / weights[i]).clamp(0.0, ONE_MINUS_EPSILON);
-    Some((node.links[i], weights[i] / sum, rest))
+    let chosen = choose(node.groups.importance(simd, point, normal), u);
+    chosen.exists.then(|| (node.links[chosen.group as usize % GROUPS], chosen.probability, chosen.rest))
 }
 
 /// Lights chosen for a block of vertices.
@@ -201,7 +187,7 @@ impl ChosenBlock {
 }
 
 /// Kernel of [`Tree::sample_block`]. All vertices descend level by level, so that the latencies of their
-/// steps overlap.
+/// steps overlap: groups are weighed vertex by vertex, and chosen for all vertices together.
 struct BlockKernel<'t> {
     nodes: &'t [Node],
     points: &'t Row3,
@@ -216,7 +202,9 @@ impl Kernel for BlockKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> ChosenBlock {
         let Self { nodes, points, normals, u, active } = self;
-        let (mut at, mut u) = ([0; BLOCK], *u);
+        let mut at = [0u32; BLOCK];
+        let mut weights = [[0.0; GROUPS]; BLOCK];
+        let mut step = ChoiceBlock { rest: *u, ..ChoiceBlock::EMPTY };
         let mut chosen = ChosenBlock { probabilities: [1.0; BLOCK], ..ChosenBlock::NONE };
         let mut descending = active;
         while descending != 0 {
@@ -224,19 +212,24 @@ impl Kernel for BlockKernel<'_> {
             while left != 0 {
                 let i = left.trailing_zeros() as usize % BLOCK;
                 left &= left - 1;
-                let point = Vec3::from(shade::at(points, i));
-                let normal = Vec3::from(shade::at(normals, i));
-                let node = nodes.get(at[i] as usize);
-                let stepped = match node {
-                    Some(node) => step(simd, node, point, normal, u[i]),
-                    None => None,
-                };
-                let Some((link, share, rest)) = stepped else {
+                let (point, normal) = (shade::at(points, i).into(), shade::at(normals, i).into());
+                let Some(node) = nodes.get(at[i] as usize) else {
                     descending &= !(1 << i);
                     continue;
                 };
-                (at[i], u[i]) = (link, rest);
-                chosen.probabilities[i] *= share;
+                weights[i] = node.groups.importance(simd, point, normal);
+            }
+            let u = step.rest;
+            Choices { weights: &weights, u: &u }.in_lanes(simd, &mut step);
+            descending &= step.exists;
+            let mut left = descending;
+            while left != 0 {
+                let i = left.trailing_zeros() as usize % BLOCK;
+                left &= left - 1;
+                let Some(node) = nodes.get(at[i] as usize) else { continue };
+                let link = node.links[step.group[i] as usize % GROUPS];
+                at[i] = link;
+                chosen.probabilities[i] *= step.probability[i];
                 if link & LEAF != 0 {
                     chosen.lights[i] = link & !LEAF;
                     chosen.exists |= 1 << i;
@@ -269,7 +262,7 @@ impl Kernel for PdfKernel<'_> {
             if weights[i] <= 0.0 {
                 return 0.0;
             }
-            probability *= weights[i] / ends(&weights)[GROUPS - 1];
+            probability *= weights[i] / ends(weights)[GROUPS - 1];
             if links[i] & LEAF != 0 {
                 return probability;
             }
@@ -278,16 +271,6 @@ impl Kernel for PdfKernel<'_> {
         }
         0.0
     }
-}
-
-/// Prefix sums of `weights`, in ascending order. A sum exceeds the previous sum if its weight is not zero
-/// and survives rounding; a weight of zero leaves the sum unchanged.
-#[inline(always)]
-fn ends(&[a, b, c, d, e, f, g, h]: &[f32; GROUPS]) -> [f32; GROUPS] {
-    let two = a + b;
-    let four = two + (c + d);
-    let six = four + (e + f);
-    [a, two, two + c, four, four + e, six, six + g, six + g + h]
 }
 
 /// Nodes and trails for a tree to be built.

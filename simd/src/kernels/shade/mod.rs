@@ -1,11 +1,12 @@
 //! Shading of blocks of sixteen vertices, in structures of arrays: random numbers, surface points, samples of
-//! area lights, BSDFs, and camera rays.
+//! area lights, choices among groups of lights, BSDFs, and camera rays.
 //!
 //! A kernel is a function over lanes, which one f32 implements as well: with f32 it is the scalar reference,
 //! and every level gives its bits. Lanes without a vertex hold any values; their results are ignored.
 
 pub mod bsdf;
 pub mod camera;
+pub mod choice;
 pub mod coat;
 pub mod coat_tables;
 pub mod direct;
@@ -16,6 +17,7 @@ mod load;
 pub mod numbers;
 pub mod rectangle;
 pub mod scatter;
+mod sequences;
 pub mod sky;
 pub mod specular;
 pub mod surface;

@@ -1,8 +1,9 @@
 //! Owen-scrambled Sobol' points by hashing (Burley 2020), for sixteen samples at once.
 //!
 //! The operations are those of integers, in loops over sixteen words that the compiler turns into vectors at
-//! every level: the same bits by construction.
+//! every level (`sequences.rs`): the same bits by construction.
 
+use super::sequences::Sequences;
 use super::{BLOCK, Row};
 use crate::lanes::Simd;
 use crate::level::{Kernel, Level};
@@ -145,7 +146,7 @@ pub struct SampleBlock {
     pub place: [u64; BLOCK],
     /// Indices of the samples in their replicates.
     pub index: [u32; BLOCK],
-    /// First dimensions of the vertices.
+    /// First dimensions of the vertices, below 2^31.
     pub dimension: [u32; BLOCK],
 }
 
@@ -211,9 +212,15 @@ impl SampleBlock {
     /// Scalar reference; equals [`SampleBlock::vertices`] to the bit.
     pub fn reference(&self, offsets: Offsets, chooses: bool) -> VertexNumbers {
         let mut out = VertexNumbers::EMPTY;
-        match chooses {
-            true => Vertices::<true>(self, offsets, &mut out).compute(),
-            false => Vertices::<false>(self, offsets, &mut out).compute(),
+        for i in 0..BLOCK {
+            let (key, first) = (place_key(self.place[i]), self.dimension[i]);
+            let index = self.index[i].reverse_bits();
+            [out.light[0][i], out.light[1][i]] = pair(key, index, first.wrapping_add(offsets.light));
+            [out.scatter[0][i], out.scatter[1][i]] = pair(key, index, first.wrapping_add(offsets.scatter));
+            out.roulette[i] = single(key, index, first.wrapping_add(offsets.roulette));
+            if chooses {
+                out.choice[i] = single(key, index, first.wrapping_add(offsets.choice));
+            }
         }
         out
     }
@@ -236,31 +243,19 @@ impl SampleBlock {
 
 struct Vertices<'k, const CHOOSES: bool>(&'k SampleBlock, Offsets, &'k mut VertexNumbers);
 
-impl<const CHOOSES: bool> Vertices<'_, CHOOSES> {
-    /// All numbers in one loop: their latencies overlap.
-    #[inline(always)]
-    fn compute(self) {
-        let Self(samples, Offsets { light, choice, scatter, roulette }, out) = self;
-        let ([lx, ly], [sx, sy]) = (&mut out.light, &mut out.scatter);
-        for i in 0..BLOCK {
-            let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
-            let index = samples.index[i].reverse_bits();
-            [lx[i], ly[i]] = pair(key, index, first.wrapping_add(light));
-            [sx[i], sy[i]] = pair(key, index, first.wrapping_add(scatter));
-            out.roulette[i] = single(key, index, first.wrapping_add(roulette));
-            if CHOOSES {
-                out.choice[i] = single(key, index, first.wrapping_add(choice));
-            }
-        }
-    }
-}
-
 impl<const CHOOSES: bool> Kernel for Vertices<'_, CHOOSES> {
     type Out = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        self.compute();
+        let Self(samples, Offsets { light, choice, scatter, roulette }, out) = self;
+        let sequences = Sequences::new(samples, &samples.dimension);
+        sequences.pairs(light, &mut out.light);
+        sequences.pairs(scatter, &mut out.scatter);
+        sequences.singles(roulette, &mut out.roulette);
+        if CHOOSES {
+            sequences.singles(choice, &mut out.choice);
+        }
     }
 }
 
@@ -272,13 +267,9 @@ impl Kernel for Lights<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let Self(samples, Offsets { light, choice, .. }, out) = self;
-        let [x, y] = &mut out.light;
-        for i in 0..BLOCK {
-            let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
-            let index = samples.index[i].reverse_bits();
-            [x[i], y[i]] = pair(key, index, first.wrapping_add(light));
-            out.choice[i] = single(key, index, first.wrapping_add(choice));
-        }
+        let sequences = Sequences::new(samples, &samples.dimension);
+        sequences.pairs(light, &mut out.light);
+        sequences.singles(choice, &mut out.choice);
     }
 }
 
@@ -289,12 +280,8 @@ impl Kernel for Singles<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> Row {
-        let Self(samples, offset) = self;
         let mut out = [0.0; BLOCK];
-        for (i, out) in out.iter_mut().enumerate() {
-            let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());
-            *out = single(key, index, samples.dimension[i].wrapping_add(offset));
-        }
+        Sequences::new(self.0, &self.0.dimension).singles(self.1, &mut out);
         out
     }
 }
@@ -308,13 +295,10 @@ impl<const SECOND: bool> Kernel for Pairs<'_, SECOND> {
     fn run<S: Simd>(self, _: S) -> [Row; 2] {
         let Self(samples, dimension) = self;
         let mut out = [[0.0; BLOCK]; 2];
-        let [x, y] = &mut out;
-        for i in 0..BLOCK {
-            let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());
-            [x[i], y[i]] = match SECOND {
-                true => second_pair(key, index, dimension),
-                false => pair(key, index, dimension),
-            };
+        let sequences = Sequences::new(samples, &[dimension; BLOCK]);
+        match SECOND {
+            true => sequences.second_pairs(&mut out),
+            false => sequences.pairs(0, &mut out),
         }
         out
     }

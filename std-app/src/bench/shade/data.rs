@@ -5,6 +5,7 @@ use halflight_core::Level;
 use halflight_core::sampling::{mix, unit_float};
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
+use halflight_simd::kernels::shade::choice::{ChoiceBlock, Choices};
 use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
 use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
@@ -32,6 +33,7 @@ pub(super) const KERNELS: &[Kernel] = &[
     Kernel { name: "mixtures of texels", run: |blocks, i, level| blocks.0[i].mix(level) },
     Kernel { name: "numbers of a vertex", run: |blocks, i, level| blocks.0[i].numbers(level) },
     Kernel { name: "numbers of a light sample", run: |blocks, i, level| blocks.0[i].light_numbers(level) },
+    Kernel { name: "groups of lights", run: |blocks, i, level| blocks.0[i].groups(level) },
     Kernel { name: "near rectangle lights", run: |blocks, i, level| blocks.0[i].light(level) },
     Kernel { name: "samples of a sky map", run: |blocks, i, level| blocks.0[i].sky(level) },
     Kernel { name: "light on diffuse", run: |blocks, i, level| blocks.0[i].direct(DIFFUSE, level) },
@@ -72,6 +74,7 @@ struct Block {
     surface: SurfaceBlock,
     samples: SampleBlock,
     numbers: VertexNumbers,
+    groups: [[f32; 8]; 16],
     lights: EmitterBlock,
     light: LightBlock,
     bsdfs: [BsdfBlock; 2],
@@ -158,6 +161,8 @@ impl Block {
             dielectric: 0xffff,
             ..SpecularBlock::EMPTY
         };
+        let powers = [row(0.0, 1.0), row(0.0, 1.0), row(0.0, 1.0), row(0.0, 1.0)];
+        let groups = core::array::from_fn(|i| core::array::from_fn(|k| powers[k % 4][(i + k) % 16]));
         let raster = [row(0.0, 640.0), row(0.0, 480.0)];
         let textures = TextureBlock {
             at: weights,
@@ -173,6 +178,7 @@ impl Block {
             surface,
             samples,
             numbers,
+            groups,
             lights,
             light,
             bsdfs,
@@ -252,6 +258,16 @@ impl Block {
             Some(level) => self.textures.mix(level, &mut mixture),
         }
         black_box(&mixture);
+    }
+
+    fn groups(&self, level: Option<Level>) {
+        let choices = Choices { weights: &self.groups, u: &self.numbers.choice };
+        let mut block = ChoiceBlock::EMPTY;
+        match level {
+            None => block = choices.reference(),
+            Some(level) => choices.compute(level, &mut block),
+        }
+        black_box(&block);
     }
 
     fn light(&self, level: Option<Level>) {
