@@ -2,7 +2,7 @@
 //! record made from them.
 //!
 //! A gather ray finds the light that its hit reflects, by path tracing; light that its hit emits or mirrors
-//! is direct light, which each path of the picture finds itself ([`PathClasses`]). All N² rays of a point
+//! is direct light, which each path of the picture finds itself (`PathClasses`). All N² rays of a point
 //! form one or several waves, in blocks of 8 × 8 strata for coherent traversal.
 
 use crate::Rgb;
