@@ -29,6 +29,13 @@ impl Record {
         is_valid.then(|| (Rgb::from(self.extrapolate(One, &weight)), weight.weight))
     }
 
+    /// Weight of the record at the point, with a support of at most `support` radii. `None` outside.
+    #[inline]
+    pub(super) fn weight(&self, point: &QueryPoint, least_cos: f32, support: f32) -> Option<f32> {
+        let (is_valid, weight) = self.weigh(One, &Query::of(point), least_cos, self.overlap.min(support));
+        is_valid.then_some(weight.weight)
+    }
+
     /// True if the record covers the point.
     #[inline]
     pub fn covers(&self, point: &QueryPoint, least_cos: f32) -> bool {

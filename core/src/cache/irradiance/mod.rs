@@ -5,6 +5,7 @@
 pub mod derivatives;
 mod evaluate;
 mod lanes;
+mod leaving;
 pub mod metric;
 mod neighbours;
 mod packet;
@@ -17,13 +18,14 @@ pub use super::hemisphere::{Hemisphere, SIDE_MAX};
 pub use super::octree::POINTS;
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use lanes::QueryPoint;
+pub(crate) use leaving::leaving_light;
 pub use metric::Metric;
 pub(in crate::cache) use neighbours::GRADIENT_VARIANCE;
 pub use packet::Points;
 pub use record::{OVERHANG_DISTANCE_FACTOR, OVERHANG_RADIUS_FACTOR, Record, SECTORS};
 pub(crate) use reflected::Viewer;
 pub use store::{CachedIrradiance, GREATEST_DEVIATION, IrradianceCache};
-pub use validity::{Validity, validity};
+pub use validity::{Validity, validity, validity_with_lobe};
 
 #[cfg(test)]
 mod placement;

@@ -1,7 +1,11 @@
 //! Interpolation of the radiance that a lobe reflects, from the valid records with coefficients of a cache.
+//!
+//! Coefficients are extrapolated to first order, so that their error grows with the square of the distance.
+//! Only records that cover a point supply it, whatever their overlap; where neighbours have shrunk all of
+//! these, the records with a support there do.
 
 use super::{IrradianceCache, QueryPoint, Record};
-use crate::cache::radiance::{RecordCoefficients, ServedLobe, Weights};
+use crate::cache::radiance::{PooledRecord, RecordCoefficients, ServedLobe, Weights};
 use crate::geometry::Frame;
 use crate::{Level, Rgb};
 use glam::Vec3;
@@ -28,6 +32,9 @@ impl Turned {
     }
 }
 
+/// Supports of the records that supply a lobe, in radii, until one record is found.
+const SUPPORTS: [f32; 2] = [1.0, f32::INFINITY];
+
 impl IrradianceCache<'_> {
     /// Radiance that the lobe of `viewer` reflects at `point`, weighted as the irradiance is. With
     /// `first_alone` the first valid record is enough. `None` if no valid record has coefficients.
@@ -39,17 +46,19 @@ impl IrradianceCache<'_> {
         first_alone: bool,
     ) -> Option<Rgb> {
         let coefficients = self.coefficients()?;
-        let (mut sum, mut weights, mut turned) = (Rgb::ZERO, 0.0, None);
-        self.visit_numbered(point, |number, record, weight| {
-            if let Some(radiance) =
-                of_record(level, coefficients, (number, record), (point, viewer), &mut turned)
-            {
-                sum += weight * radiance;
-                weights += weight;
-            }
-            !(first_alone && weights > 0.0)
-        });
-        (weights > 0.0).then(|| sum / weights)
+        SUPPORTS.into_iter().find_map(|support| {
+            let (mut sum, mut weights, mut turned) = (Rgb::ZERO, 0.0, None);
+            self.visit_lobes(point, support, |(record, pooled), weight| {
+                if let Some(radiance) =
+                    of_record(level, coefficients, (record, pooled), (point, viewer), &mut turned)
+                {
+                    sum += weight * radiance;
+                    weights += weight;
+                }
+                !(first_alone && weights > 0.0)
+            });
+            (weights > 0.0).then(|| sum / weights)
+        })
     }
 }
 
@@ -57,11 +66,10 @@ impl IrradianceCache<'_> {
 fn of_record(
     level: Level,
     coefficients: &RecordCoefficients,
-    (number, record): (u32, &Record),
+    (record, pooled): (&Record, &PooledRecord),
     (point, viewer): (&QueryPoint, &Viewer),
     turned: &mut Option<Turned>,
 ) -> Option<Rgb> {
-    let pooled = coefficients.of(number)?;
     let normal = Vec3::from(record.normal);
     let known = match turned.take() {
         Some(known) if known.frame.normal == normal => known,

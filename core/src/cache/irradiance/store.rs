@@ -158,19 +158,23 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Calls `visit` with each record that is valid at a point, its number and its weight, while it returns
-    /// true.
-    pub(crate) fn visit_numbered(
+    /// Calls `visit` with each record with coefficients that is valid at a point, and its weight, while it
+    /// returns true. Supports are at most `support` radii.
+    pub(super) fn visit_lobes(
         &self,
         point: &QueryPoint,
-        mut visit: impl FnMut(u32, &Record, f32) -> bool,
+        support: f32,
+        mut visit: impl FnMut((&Record, &PooledRecord), f32) -> bool,
     ) {
-        self.tree.at(point.position, |index| match self.records.get(index as usize) {
-            Some(record) => match record.at(point, self.least_cos) {
-                Some((_, weight)) => visit(index, record, weight),
+        self.tree.at(point.position, |index| {
+            let pooled = self.coefficients.as_ref().and_then(|known| known.of(index));
+            match self.records.get(index as usize).zip(pooled) {
+                Some(found) => match found.0.weight(point, self.least_cos, support) {
+                    Some(weight) => visit(found, weight),
+                    None => true,
+                },
                 None => true,
-            },
-            None => true,
+            }
         });
     }
 

@@ -41,13 +41,44 @@ const OVERLAP: f32 = 1.5;
 /// errors average out. To first order this would fail, since the error of extrapolation is quadratic in
 /// distance; but the Hessian is known and included in the extrapolation.
 pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
+    let (principal, radii) = wanted(settings, derivatives);
+    region(settings, derivatives, principal, radii)
+}
+
+/// [`validity`] of a record that also supplies a lobe: with [`Metric::Halflight`] by the larger curvatures of
+/// the irradiance and of the light `leaving` to the viewer, along the axes of the larger.
+pub fn validity_with_lobe(settings: &Settings, derivatives: &Derivatives, leaving: &Derivatives) -> Validity {
+    let (own, radii) = wanted(settings, derivatives);
+    let (other, others) = wanted(settings, leaving);
+    let is_narrower = settings.metric == Metric::Halflight && others[0] < radii[0];
+    if !is_narrower {
+        return region(settings, derivatives, own, radii);
+    }
+    let Hessian { xx, xy, yy } = derivatives.hessian;
+    let signed = [other.axis, other.axis.perp()]
+        .map(|axis| axis.x * (xx * axis.x + xy * axis.y) + axis.y * (xy * axis.x + yy * axis.y));
+    let irradiance = derivatives.luminance();
+    let curvature = [0, 1].map(|k: usize| other.curvature[k].max(signed[k].abs() / irradiance));
+    let allowed = settings.error * settings.extent * settings.extent;
+    let radii = [others[0], others[1].min(radius(allowed, curvature[1]))];
+    region(settings, derivatives, PrincipalCurvatures { axis: other.axis, curvature, signed }, radii)
+}
+
+/// True if there is light to extrapolate.
+fn is_lit(derivatives: &Derivatives) -> bool {
+    let irradiance = derivatives.luminance();
+    irradiance > 0.0 && irradiance.is_finite() && derivatives.luminance_gradient().length().is_finite()
+}
+
+/// Curvatures and radii that the metric wants, before its limits.
+fn wanted(settings: &Settings, derivatives: &Derivatives) -> (PrincipalCurvatures, [f32; 2]) {
     let irradiance = derivatives.luminance();
     let slope = derivatives.luminance_gradient().length();
     // A black or invalid record has no meaningful gradient.
-    let lit = irradiance > 0.0 && irradiance.is_finite() && slope.is_finite();
+    let lit = is_lit(derivatives);
     let flat = if lit && slope > 0.0 { irradiance / slope } else { f32::INFINITY };
     let circle = |distance: f32| (PrincipalCurvatures::default(), [settings.error * distance; 2]);
-    let (principal, radii) = match settings.metric {
+    match settings.metric {
         Metric::SplitSphere => circle(derivatives.harmonic_mean_distance),
         Metric::BoundedSplitSphere => circle(derivatives.harmonic_mean_distance.min(flat)),
         Metric::MinDistance => circle(derivatives.min_distance),
@@ -59,10 +90,19 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
             let bound = if settings.metric == Metric::Halflight { flat } else { f32::INFINITY };
             (principal, [short.min(bound), long])
         }
-    };
+    }
+}
+
+/// Region with `wanted` radii along the axes of `principal`.
+fn region(
+    settings: &Settings,
+    derivatives: &Derivatives,
+    principal: PrincipalCurvatures,
+    wanted: [f32; 2],
+) -> Validity {
+    let (irradiance, lit) = (derivatives.luminance(), is_lit(derivatives));
     let PrincipalCurvatures { axis, curvature, signed } = principal;
-    let wanted = radii;
-    let radii = clamped(settings, radii);
+    let radii = clamped(settings, wanted);
     // Radii enlarged to the minimum keep the change of light over the wanted radii: a pixel shows no more,
     // and derivatives due to such a near border say nothing about its other side.
     let shares =
@@ -268,6 +308,23 @@ mod tests {
         assert_eq!(found.gradient_scale, 0.0);
         near(validity(&settings(Metric::OcclusionHessian), &black).radii[0], radius(1.0));
         assert_eq!(validity(&settings(Metric::RadiometricHessian), &black).radii, [100.0; 2]);
+    }
+
+    /// Leaving light has the curvature 8 along y, irradiance 2 along x: the axes are those of the former, and
+    /// the irradiance bends along them.
+    #[test]
+    fn leaving_light_narrows_the_region_and_irradiance_bends_in_it() {
+        let settings = Settings { floor: 0.0, ..settings(Metric::Halflight) };
+        let own = record([-4.0, 0.0, 0.25], Vec2::ZERO);
+        let leaving = record([0.5, 0.0, 16.0], Vec2::ZERO);
+        let found = validity_with_lobe(&settings, &own, &leaving);
+        near(found.radii[0], (0.16 / PI / 8.0f32).powf(0.25));
+        near(found.radii[1], (0.16 / PI / 2.0f32).powf(0.25));
+        assert_eq!((found.axis.abs(), found.bend, found.curvature), (Vec2::Y, [0.125, -2.0], [8.0, 2.0]));
+        let flat = Derivatives { hessian: Hessian::default(), ..leaving };
+        assert_eq!(validity_with_lobe(&settings, &own, &flat), validity(&settings, &own));
+        let unknown = Derivatives { hessian: Hessian { xx: f32::NAN, xy: 0.0, yy: 0.0 }, ..leaving };
+        assert!(validity_with_lobe(&settings, &own, &unknown).radii[0] > 0.0);
     }
 
     #[test]

@@ -70,7 +70,7 @@ impl Weights {
     }
 
     /// Weights of all coefficients.
-    pub(super) fn all(&self) -> &[f32; COUNT_MAX] {
+    pub(crate) fn all(&self) -> &[f32; COUNT_MAX] {
         self.registers.as_flattened().first_chunk().unwrap_or(&[0.0; COUNT_MAX])
     }
 }

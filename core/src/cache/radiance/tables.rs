@@ -2,7 +2,7 @@
 
 use super::basis::{Basis, Representation};
 use super::coefficients::Coefficients;
-use super::derivatives::border_flux;
+use super::derivatives::{CoefficientDerivatives, border_flux};
 use super::pool::{Expansion, PooledRecord, write};
 use super::sh::{self, ShCoefficients, ShTables};
 use super::strata::StrataTables;
@@ -66,6 +66,17 @@ impl<'m> GatherTables<'m> {
     /// True if gradients need the normals of the hits.
     pub fn needs_normals(&self) -> bool {
         matches!(self, Self::SphericalHarmonics(_))
+    }
+
+    /// Coefficients of the light of `hemisphere` with first and second derivatives. `None` for another number
+    /// of strata, or with spherical harmonics, whose Hessians are unknown.
+    pub(crate) fn change(
+        &self,
+        level: Level,
+        hemisphere: &Hemisphere,
+    ) -> Option<(Coefficients, CoefficientDerivatives)> {
+        let Self::Zernike(tables) = self else { return None };
+        Some((Coefficients::project(level, tables, hemisphere)?, border_flux(level, tables, hemisphere)?))
     }
 
     /// Projects the light of `hemisphere` and writes its coefficients and their gradients, times

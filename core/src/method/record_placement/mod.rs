@@ -16,6 +16,7 @@ use crate::cache::irradiance::{CellFlux, metric};
 use crate::cache::radiance::{GatherTables, Representation, ServedLobes};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::cached::gather::{GatherPoint, Gathering};
+use crate::transport::cached::lobe::CoefficientGathering;
 use crate::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use crate::transport::{CausticMerging, Counters, PathIntegrator};
 
@@ -273,19 +274,21 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         let number = |point: usize| 2 * (builder.gathered + point as u32) + builder.index;
         let mut found = [None; MOST_POINTS];
         let (lobes, registers) = match self.lobes.as_deref_mut() {
-            Some(LobeGathering { flux, strata, registers, .. }) => {
-                (Some((&*flux, &*strata)), &mut **registers)
+            Some(LobeGathering { lobes, flux, strata, registers }) => {
+                (Some((&*lobes, &*flux, &*strata)), &mut **registers)
             }
             None => (None, Default::default()),
         };
-        let stride = lobes.map_or(1, |(_, strata)| strata.representation().registers());
+        let stride = lobes.map_or(1, |(.., strata)| strata.representation().registers());
         let mut staged = registers.chunks_mut(stride);
         let pieces = points.iter().zip(&mut found).map(|piece| (piece, staged.next().unwrap_or_default()));
         let passed = executor.pass(pieces, |i, ((point, found), registers), worker| {
             let mut counters = Counters::default();
             let scratch = &mut worker.scratch;
             let (gathering, strata) = match lobes.filter(|_| point.has_lobe()) {
-                Some((flux, strata)) => (Gathering { flux, ..gathering }, Some((strata, registers))),
+                Some((lobes, flux, tables)) => {
+                    (Gathering { flux, ..gathering }, Some(CoefficientGathering { tables, lobes, registers }))
+                }
                 None => (gathering, None),
             };
             let record = match self.photons {

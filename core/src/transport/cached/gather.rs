@@ -2,28 +2,25 @@
 //! record made from them.
 //!
 //! A gather ray finds the light that its hit reflects, by path tracing; light that its hit emits or mirrors
-//! is direct light, which each path of the picture finds itself ([`PathClasses`]). All N² rays of a point
+//! is direct light, which each path of the picture finds itself (`PathClasses`). All N² rays of a point
 //! form one or several waves, in blocks of 8 × 8 strata for coherent traversal.
 
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::cache::irradiance::{
-    CellFlux, Hemisphere, Metric, OVERHANG_RADIUS_FACTOR, QueryPoint, Record, metric, validity,
-};
-use crate::cache::radiance::{GatherTables, PooledRecord};
-use crate::geometry::{Frame, Hit, MISS, Ray};
+use crate::cache::irradiance::{CellFlux, Hemisphere, Metric, Record, metric, validity, validity_with_lobe};
+use crate::cache::radiance::PooledRecord;
+use crate::geometry::{Frame, Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::sampling::warp::cosine_hemisphere;
-use crate::scene::SurfacePoint;
+pub use crate::transport::cached::gather_point::GatherPoint;
+use crate::transport::cached::lobe::CoefficientGathering;
 use crate::transport::path::sharing::PathWave;
 use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use crate::transport::walk::dimension;
-use crate::transport::walk::path_classes::PathClasses;
 use crate::transport::wavefront::{PathState, WAVE};
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Offset of the pixel numbers of gathers, beyond those of any picture.
@@ -32,112 +29,6 @@ pub(in crate::transport) const NO_PIXEL: u32 = 1 << 30;
 /// Minimum strata along a side for packets. With fewer, the rays of a block diverge, and packets cost a
 /// quarter of the time of a record in Sponza with 16, a tenth with 32.
 const NARROW: usize = 64;
-
-/// Diffuse point at which irradiance is gathered. Both normals are on the side of the viewer.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct GatherPoint {
-    pub(in crate::transport) position: [f32; 3],
-    /// Error bound of `position`.
-    pub(in crate::transport) error: f32,
-    /// Shading normal, the axis of the hemisphere.
-    pub(in crate::transport) normal: [f32; 3],
-    pub(in crate::transport) geometric_normal: [f32; 3],
-    pub(in crate::transport) triangle: u32,
-    /// Width of a pixel at this point.
-    pub(in crate::transport) pixel: f32,
-    /// Maximum distance of records that are valid here, and of points at which the record of this point is
-    /// valid: [`QueryPoint::within`].
-    pub(in crate::transport) within: f32,
-    /// 1 if the viewer sees a lobe that records serve, otherwise 0.
-    pub(in crate::transport) has_lobe: u32,
-}
-
-impl GatherPoint {
-    /// No point.
-    pub const NONE: GatherPoint = GatherPoint {
-        position: [0.0; 3],
-        error: 0.0,
-        normal: [0.0; 3],
-        geometric_normal: [0.0; 3],
-        triangle: MISS,
-        pixel: 0.0,
-        within: f32::INFINITY,
-        has_lobe: 0,
-    };
-
-    /// True if this is a point.
-    pub fn is_some(&self) -> bool {
-        self.triangle != MISS
-    }
-
-    /// Gather point at `point`, where a pixel has the width `pixel`.
-    pub(in crate::transport) fn of(point: &SurfacePoint, pixel: f32) -> Self {
-        Self {
-            position: point.position.to_array(),
-            error: point.error,
-            normal: point.frame.normal.to_array(),
-            geometric_normal: point.geometric_normal.to_array(),
-            triangle: point.triangle,
-            pixel,
-            within: f32::INFINITY,
-            has_lobe: 0,
-        }
-    }
-
-    /// This point, with a lobe that records serve.
-    pub(in crate::transport) fn with_lobe(self, has_lobe: bool) -> Self {
-        Self { has_lobe: u32::from(has_lobe), ..self }
-    }
-
-    /// True if the record of this point is to have coefficients.
-    pub fn has_lobe(&self) -> bool {
-        self.has_lobe != 0
-    }
-
-    /// Position of the point.
-    pub fn position(&self) -> Vec3 {
-        self.position.into()
-    }
-
-    /// Query of this point to a cache.
-    pub fn query(&self) -> QueryPoint {
-        QueryPoint { position: self.position(), normal: self.normal(), within: self.within }
-    }
-
-    /// True if an overhang is so close that records with radii of `pixels` pixels are too coarse.
-    pub fn is_confined(&self, pixels: f32) -> bool {
-        self.within < OVERHANG_RADIUS_FACTOR * pixels * self.pixel
-    }
-
-    /// Shading normal.
-    pub fn normal(&self) -> Vec3 {
-        self.normal.into()
-    }
-
-    /// Width of a pixel at this point.
-    pub fn pixel(&self) -> f32 {
-        self.pixel
-    }
-
-    /// Gather ray along the unit vector `direction`, in world space.
-    pub(in crate::transport) fn ray(&self, direction: Vec3) -> Ray {
-        let geometric = Vec3::from(self.geometric_normal);
-        let ray = Ray::new(self.position() + self.error * geometric, direction);
-        // No light arrives from below the surface.
-        if direction.dot(geometric) > 0.0 { ray } else { Ray { t_max: -1.0, ..ray } }
-    }
-
-    /// Path of a gather ray; its light belongs to stratum `index`.
-    pub(in crate::transport) fn path(&self, pixel: u32, sample: u32, index: usize) -> PathState {
-        PathState {
-            position: self.position,
-            segments: 2,
-            triangle: self.triangle,
-            ..PathState::new(pixel, index as u32, sample, PathClasses::REFLECTED)
-        }
-    }
-}
 
 /// Settings of gathering.
 #[derive(Clone, Copy)]
@@ -243,14 +134,14 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         place: &GatherPoint,
         number: u32,
         gathering: &Gathering,
-        coefficients: Option<(&GatherTables, &mut [[u16; 16]])>,
+        coefficients: Option<CoefficientGathering>,
         scratch: &mut Arena,
         counters: &mut Counters,
     ) -> Result<Option<(Record, PooledRecord)>, OutOfMemory> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
         let mut arena = scratch.scratch();
-        let needs_normals = coefficients.as_ref().is_some_and(|(tables, _)| tables.needs_normals());
+        let needs_normals = coefficients.as_ref().is_some_and(|of| of.tables.needs_normals());
         let mut strata = HemisphereSamples::new(n, metric.metric, needs_normals, &mut arena)?;
         let frame = Frame::from_normal(place.normal());
         let generate = |i| self.generate_gather_ray(place, &frame, (number, i), n);
@@ -265,7 +156,15 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let picture = place.pixel * libm::sqrtf(self.settings.width as f32 * self.settings.height as f32);
         let settings = metric::Settings { least: least_pixels * place.pixel, ..metric.within(picture) };
         let limited = strata.limited().and_then(|h| metric.metric.derivatives(self.context.level, flux, &h));
-        let reach = validity(&settings, limited.as_ref().unwrap_or(&derivatives));
+        let of_radii = limited.as_ref().unwrap_or(&derivatives);
+        let lobe = coefficients
+            .as_ref()
+            .zip(strata.hemisphere())
+            .and_then(|(of, hemisphere)| self.leaving_light(place, (&frame, &hemisphere), of, &derivatives));
+        let reach = match lobe {
+            Some(lobe) => validity_with_lobe(&settings, of_radii, &lobe),
+            None => validity(&settings, of_radii),
+        };
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
         let luminance = derivatives.luminance();
         record.set_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
@@ -273,9 +172,9 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         record.set_edge_moment(strata.hemisphere().map_or(Rgb::ZERO, |hemisphere| hemisphere.edge_moment()));
         self.find_boundary(&mut record, place, &frame, &strata, counters);
         self.add_overhangs(&mut record, place);
-        let pooled = coefficients.and_then(|(tables, out)| {
+        let pooled = coefficients.and_then(|of| {
             let scales = (reach.gradient_scale, record.radii[0]);
-            tables.write(self.context.level, &strata.hemisphere()?, scales, out)
+            of.tables.write(self.context.level, &strata.hemisphere()?, scales, of.registers)
         });
         Ok(Some((record, pooled.unwrap_or_default())))
     }

@@ -3,6 +3,8 @@
 
 pub(in crate::transport) mod boundary;
 pub mod gather;
+mod gather_point;
+pub mod lobe;
 pub(in crate::transport) mod lookup;
 pub(in crate::transport) mod overhang;
 pub mod placement;

@@ -150,14 +150,15 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             width += spread * segment.length;
             let bsdf = self.context.bsdf_at(&point);
             let is_wanted = seen == sight && point.frame.normal.dot(point.geometric_normal) > SMOOTH;
-            let place = |has_lobe| is_wanted.then(|| GatherPoint::of(&point, width).with_lobe(has_lobe));
+            let place = || is_wanted.then(|| GatherPoint::of(&point, width));
             if let Bsdf::Diffuse(_) = bsdf {
-                return place(false);
+                return place();
             }
-            let wo = point.frame.to_local(-Vec3::from(segment.ray.direction));
+            let direction = Vec3::from(segment.ray.direction);
+            let wo = point.frame.to_local(-direction);
             // Paths end at a served lobe, and records behind rough surfaces have no coefficients.
             if F::GLOSSY && seen == Via::Specular && lobes.is_some_and(|lobes| lobes.serves(&bsdf, wo.z)) {
-                return place(true);
+                return place().map(|place| place.with_lobe(direction, &met));
             }
             let [u, v] = dimension::scattering(sampler, segments);
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
@@ -167,7 +168,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
                 let sample = bsdf.sample_apart::<F>(wo, [u, v, lobe], base_weight);
                 match sample.filter(|(_, is_coat)| *is_coat) {
                     Some((sample, _)) if seen != sight || sample.delta => sample,
-                    _ => return place(false),
+                    _ => return place(),
                 }
             } else {
                 bsdf.sample::<F>(wo, [u, v, lobe])?
