@@ -38,7 +38,7 @@ const PILOT_RAYS: f64 = 5e5;
 const PILOT_SHARE: f64 = 0.08;
 
 /// Work of a pixel of the pilot, and the fraction of the work that its pixels may take where it is larger.
-const RAYS_OF_PILOT_PIXEL: f64 = 90.0;
+const RAYS_OF_PILOT_PIXEL: f64 = 300.0;
 const PILOT_PIXELS: f64 = 0.02;
 
 /// Work of a ray of cached paths in a scene of few triangles, with its share of look-ups. It is below one

@@ -204,7 +204,12 @@ impl Choice {
             counts,
             gain: Some(if alone > 0.0 { alone / product } else { 0.0 }),
             gain_of_connections: if unconnected > 0.0 { unconnected / product } else { 0.0 },
-            noise: PilotNoise { light_paths, work, rests: found.rests, work_of_paths },
+            noise: PilotNoise {
+                light_paths: light_paths.without(found.edges),
+                work,
+                rests: found.rests,
+                work_of_paths,
+            },
             light_paths: "they reduce noise for the work by a pilot",
             connections: match counts.connections {
                 0 => "splats alone have less noise for the work by a pilot",

@@ -56,8 +56,9 @@ const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 /// are caustic photons beside records, too.
 pub const RESTS: usize = 3;
 
-/// Ways to find light: by the counts of each candidate, and by path tracing each of the rests.
-const WAYS: usize = CANDIDATES + RESTS;
+/// Ways to find light: by the counts of each candidate, and by path tracing each of the rests, and emitters that
+/// are seen.
+const WAYS: usize = CANDIDATES + RESTS + 1;
 
 /// Values of the pixels of a tile by each way, one sample less the other.
 const SUMS: usize = WAYS * PIXELS_PER_TILE;
@@ -72,6 +73,8 @@ pub struct Found {
     pub candidates: [Rarity; CANDIDATES],
     /// Noise of path tracing, for each of the rests.
     pub rests: [Rarity; RESTS],
+    /// Relative variance of emitters that are seen: that of their edges in large pixels, for all candidates.
+    pub edges: f32,
     /// Work of its techniques.
     pub work: Work,
     /// Fraction of the light that merges bring.

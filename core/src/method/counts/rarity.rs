@@ -83,6 +83,13 @@ impl Rarity {
         self
     }
 
+    /// Without so much noise of light that is found often.
+    pub fn without(mut self, noise: f32) -> Self {
+        let often = &mut self.noise[CLASSES - 1];
+        *often = (*often - noise).max(0.0);
+        self
+    }
+
     /// relMSE after so many `samples` of each of the `pixels`.
     pub fn error(&self, samples: f64, pixels: f64) -> f64 {
         let (mut missing, mut hits) = (0.0, 0.0);
@@ -140,5 +147,6 @@ mod tests {
     fn noise_has_a_lower_limit() {
         let rarity = Rarity::often(2.0).over(4.0, 0.75);
         assert_eq!(rarity.noise(), 0.75);
+        assert_eq!([0.5, 2.0].map(|edges| rarity.without(edges).noise()), [0.25, 0.0]);
     }
 }

@@ -18,14 +18,15 @@ impl<F: Features> Pilot<'_, '_, F> {
         let all: fn(Rest) -> bool = |_| true;
         let candidates = self.candidates.iter().map(move |candidate| (*candidate, all));
         let rests: [fn(Rest) -> bool; RESTS] = match self.has_photons {
-            false => [all, Rest::is_beside_irradiance, Rest::is_beside_lobes],
+            false => [|rest| !rest.is_seen(), Rest::is_beside_irradiance, Rest::is_beside_lobes],
             true => [
-                |rest| !rest.is_of_photons(false),
+                |rest| !rest.is_seen() && !rest.is_of_photons(false),
                 |rest| rest.is_beside_irradiance() && !rest.is_of_photons(true),
                 |rest| rest.is_beside_lobes() && !rest.is_of_photons(true),
             ],
         };
-        candidates.chain(rests.map(|is_found| (Candidate::PATHS, is_found)))
+        let paths = rests.into_iter().chain([Rest::is_seen as fn(Rest) -> bool]);
+        candidates.chain(paths.map(|is_found| (Candidate::PATHS, is_found)))
     }
 
     /// Adds camera paths of a sample to the `blocks` and sums of their tile. The variance is that of pairs
@@ -47,8 +48,7 @@ impl<F: Features> Pilot<'_, '_, F> {
             self.ways().zip(sums.chunks_mut(PIXELS_PER_TILE)).enumerate()
         {
             let ratios = candidate.ratios(&self.counts);
-            let counts = |weighed: &&Weighed| !weighed.rest().is_seen() && is_found(weighed.rest());
-            for weighed in weighed.iter().filter(counts) {
+            for weighed in weighed.iter().filter(|weighed| is_found(weighed.rest())) {
                 let Reweighted { value, square, likelihood } = weighed.with(&ratios);
                 let block = &mut blocks[weighed.place() / BLOCK];
                 let is_sum = weighed.is_merge() && candidate.merging;
@@ -118,6 +118,7 @@ impl<F: Features> Pilot<'_, '_, F> {
         };
         let candidates = core::array::from_fn(rarity);
         let rests = core::array::from_fn(|rest| rarity(CANDIDATES + rest));
+        let edges = rarity(CANDIDATES + RESTS).noise();
         let samples = pixels / SAMPLE;
         let connections = of(&|block| block.connections);
         let light_paths = (self.tasks * PATHS_PER_TASK) as f32 / SAMPLE;
@@ -129,7 +130,7 @@ impl<F: Features> Pilot<'_, '_, F> {
             splats: light.shadow_rays as f32 / light_paths,
         };
         let merged = of(&|block| block.merged) / of(&|block| block.light).max(f32::MIN_POSITIVE);
-        Found { candidates, rests, work, merged }
+        Found { candidates, rests, edges, work, merged }
     }
 }
 
