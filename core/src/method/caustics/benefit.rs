@@ -3,7 +3,6 @@
 //! Photons pay in two cases: they carry much of the light; or they carry a little of it that path tracing
 //! finds so rarely that it would be most of the noise, such as the caustic of a small glass in a large room.
 
-use super::photons::PATHS_PER_SAMPLE;
 use crate::transport::Pilot;
 use crate::transport::caustics::tracer::{BLOCKS, GuideSample};
 use core::f64::consts::PI;
@@ -19,8 +18,8 @@ const LEAST_GAIN: f64 = 2.0;
 /// Least fraction of light paths that the camera sees, for photons that pay by noise.
 const LEAST_VISIBLE: f64 = 0.0125;
 
-/// The part of the least share from which on a first test is undecided. The test finds a half to twice the share,
-/// and a tenth of the visible paths as long as it has not learned which of many lights matter.
+/// The part of the least share from which on a first test is undecided. The test finds a half to twice the
+/// share, and a tenth of the visible paths as long as it has not learned which of many lights matter.
 const DOUBT_SHARE: f64 = 0.25;
 
 /// Samples of a picture, and how often its paths must find light for this light to be noise. Light that is
@@ -42,6 +41,10 @@ const GATHERING: f64 = 1.45;
 /// which on the budget grows.
 const MOST_BUDGET: f64 = 4.0;
 const BUDGET_RATIO: f64 = 0.4;
+
+/// Light paths of a map for each pixel of the picture and each sample that the map serves, with the usual
+/// photon budget.
+pub(super) const PATHS_PER_SAMPLE: f64 = 0.5;
 
 const ALL: usize = (BLOCKS * BLOCKS) as usize;
 

@@ -3,6 +3,7 @@
 //! pair of maps to the next as those of progressive photon mapping do (Knaus and Zwicker 2011), so that the
 //! blur vanishes.
 
+use super::benefit::PATHS_PER_SAMPLE;
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
 use crate::bsdf::Features;
 use crate::light::EmissionSampler;
@@ -14,9 +15,7 @@ use crate::photon::PhotonMap;
 use crate::transport::caustics::tracer::{PATHS_PER_TASK, PHOTONS_PER_TASK};
 use crate::transport::{CausticMerging, LightEstimator, PathIntegrator, RadiusSchedule, Sharing, path::WAVE};
 
-/// Light paths of a map for each pixel of the picture and each sample that the map serves, with the usual
-/// photon budget; at least and at most.
-pub(super) const PATHS_PER_SAMPLE: f64 = 0.5;
+/// Light paths of a map for each sample that it serves, at least and at most.
 const FEWEST_PATHS: usize = 16 * PATHS_PER_TASK;
 const MOST_PATHS: usize = 4096 * PATHS_PER_TASK;
 

@@ -59,8 +59,8 @@ pub fn scratch<F: Features>() -> Footprint {
 }
 
 /// Counts for a picture of `context`, as far as `settings` leave them open, by a pilot with one pixel for
-/// each `part` of the picture, which may have caustic photons; `None` where all are given or memory is too short
-/// for a pilot.
+/// each `part` of the picture, which may have caustic photons; `None` where all are given or memory is too
+/// short for a pilot.
 ///
 /// # Errors
 /// [`OutOfMemory`] where the scratch of the executor is smaller than [`scratch`].
@@ -122,8 +122,8 @@ pub struct PilotNoise {
     pub light_paths: Rarity,
     /// Rays of a sample of a pixel with the chosen counts.
     pub work: f32,
-    /// Noise of path tracing: all light that its caustic photons leave, the rest beside records of irradiance,
-    /// and that beside records of lobes.
+    /// Noise of path tracing: all light that its caustic photons leave, the rest beside records of
+    /// irradiance, and that beside records of lobes.
     pub rests: [Rarity; RESTS],
     /// Rays of a sample of a pixel by path tracing.
     pub work_of_paths: f32,

@@ -52,12 +52,12 @@ const WEIGHTINGS: usize = 1 + CHOSEN.len();
 const BLOCK: usize = 64;
 const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
-/// Rests of light: beside caustic photons alone, beside records of irradiance, and beside those of lobes. There
-/// are caustic photons beside records, too.
+/// Rests of light: beside caustic photons alone, beside records of irradiance, and beside those of lobes.
+/// There are caustic photons beside records, too.
 pub const RESTS: usize = 3;
 
-/// Ways to find light: by the counts of each candidate, and by path tracing each of the rests, and emitters that
-/// are seen.
+/// Ways to find light: by the counts of each candidate, and by path tracing each of the rests, and emitters
+/// that are seen.
 const WAYS: usize = CANDIDATES + RESTS + 1;
 
 /// Values of the pixels of a tile by each way, one sample less the other.

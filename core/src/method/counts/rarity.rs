@@ -1,5 +1,5 @@
-//! Noise by the rarity of light. Light that a picture finds only a few times is missing from it: its error is the
-//! square of its radiance, not its variance, which pictures of so few samples seldom show.
+//! Noise by the rarity of light. Light that a picture finds only a few times is missing from it: its error
+//! is the square of its radiance, not its variance, which pictures of so few samples seldom show.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -31,8 +31,8 @@ pub fn is_often(likelihood: f32) -> bool {
 }
 
 impl RaritySums {
-    /// Adds a contribution of `light` with its `variance`, whose paths are found `likelihood` times as often as
-    /// by the pilot; `weight` of all three.
+    /// Adds a contribution of `light` with its `variance`, whose paths are found `likelihood` times as often
+    /// as by the pilot; `weight` of all three.
     pub fn add(&mut self, likelihood: f32, weight: f32, light: f32, variance: f32) {
         let class = class(likelihood);
         self.variance[class] += weight * variance;
