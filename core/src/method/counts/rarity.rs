@@ -63,7 +63,7 @@ impl Rarity {
         self.noise.iter().sum()
     }
 
-    /// Adds a block of so many `pixels`, whose squared light is relative to `scale`.
+    /// Adds a block of that number of `pixels`, whose squared light is relative to `scale`.
     pub fn add(&mut self, sums: &RaritySums, pixels: f32, scale: f32) {
         let mut light = 0.0;
         for class in 0..CLASSES {
@@ -74,7 +74,7 @@ impl Rarity {
         }
     }
 
-    /// Means over so many pixels of what was added, with at least this `noise`.
+    /// Means of all sums over `pixels`, with a noise of `least_noise` at least.
     pub fn over(mut self, pixels: f32, least_noise: f32) -> Self {
         for of_class in [&mut self.noise, &mut self.missing, &mut self.hits] {
             of_class.iter_mut().for_each(|sum| *sum /= pixels);
@@ -90,7 +90,7 @@ impl Rarity {
         self
     }
 
-    /// relMSE after so many `samples` of each of the `pixels`.
+    /// relMSE after this number of `samples` of each of the `pixels`.
     pub fn error(&self, samples: f64, pixels: f64) -> f64 {
         let (mut missing, mut hits) = (0.0, 0.0);
         for class in 0..CLASSES {

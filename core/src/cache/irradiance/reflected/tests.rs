@@ -58,8 +58,12 @@ fn record_of(sky: &Sky) -> Record {
     }
 }
 
-/// A cache with a record of `sky`, and one without coefficients.
-fn with_cache(sky: &Sky, served: &ServedLobes, work: impl FnOnce(&IrradianceCache)) {
+/// A cache with these records, each with the coefficients of a sky or without any.
+fn with_records(
+    served: &ServedLobes,
+    records: &[(Record, Option<&Sky>)],
+    work: impl FnOnce(&IrradianceCache),
+) {
     let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE };
     let of = served.representation();
     let footprint = IrradianceCache::footprint(2).and(RecordCoefficients::footprint(2, of));
@@ -68,16 +72,21 @@ fn with_cache(sky: &Sky, served: &ServedLobes, work: impl FnOnce(&IrradianceCach
     let cache = IrradianceCache::new(&bounds, 2, &mut arena).unwrap();
     let coefficients = RecordCoefficients::new(*served, 2, &mut arena).unwrap();
     let mut cache = cache.with_coefficients(Some(coefficients));
-    let hemisphere = sky.hemisphere();
-    let record = record_of(sky);
     let mut lines = vec![Line([0; 64]); GatherTables::footprint(N, of).bytes() / 64];
     let tables = GatherTables::build(N, of, &mut Arena::over(&mut lines)).unwrap();
     let mut registers = vec![[0; 16]; of.registers()];
-    let pooled = tables.write(Level::detect(), &hemisphere, (0.0, 0.5), &mut registers).unwrap();
-    // A record without coefficients is not asked.
-    assert!(cache.insert(record));
-    assert!(cache.insert_with(record, Some((&pooled, &registers))));
+    for (record, sky) in records {
+        let pooled = sky
+            .map(|sky| tables.write(Level::detect(), &sky.hemisphere(), (0.0, 0.5), &mut registers).unwrap());
+        let pooled = pooled.as_ref().map(|pooled| (pooled, &*registers));
+        assert!(cache.insert_with(*record, pooled));
+    }
     work(&cache);
+}
+
+/// A cache with a record of `sky`, and one without coefficients, which is not asked.
+fn with_cache(sky: &Sky, served: &ServedLobes, work: impl FnOnce(&IrradianceCache)) {
+    with_records(served, &[(record_of(sky), None), (record_of(sky), Some(sky))], work);
 }
 
 fn reflected(cache: &IrradianceCache, bsdf: &Bsdf, normal: Vec3, viewer: Vec3) -> Option<Rgb> {
@@ -89,41 +98,28 @@ fn reflected(cache: &IrradianceCache, bsdf: &Bsdf, normal: Vec3, viewer: Vec3) -
 /// A record that covers a point supplies its lobe alone; two with a support there share it where none does.
 #[test]
 fn records_supply_the_lobes_of_points_that_they_cover() {
-    let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE };
     with_served(&LobeSettings::default(), &[metal(0.3f32.sqrt())], |served| {
         let served = served.unwrap();
-        let of = served.representation();
-        let footprint = IrradianceCache::footprint(2).and(RecordCoefficients::footprint(2, of));
-        let mut lines = vec![Line([0; 64]); footprint.bytes() / 64];
-        let mut arena = Arena::over(&mut lines);
-        let cache = IrradianceCache::new(&bounds, 2, &mut arena).unwrap();
-        let coefficients = RecordCoefficients::new(*served, 2, &mut arena).unwrap();
-        let mut cache = cache.with_coefficients(Some(coefficients));
-        let mut lines = vec![Line([0; 64]); GatherTables::footprint(N, of).bytes() / 64];
-        let tables = GatherTables::build(N, of, &mut Arena::over(&mut lines)).unwrap();
-        let mut registers = vec![[0; 16]; of.registers()];
         // Light 1 at x = 0, light 2 at x = 0.4.
-        for (x, light) in [(0.0, 1.0), (0.4, 2.0)] {
-            let sky = Sky::new(N, |_| light);
-            let record =
-                Record { position: [x, 0.0, 0.0], radii: [0.15; 2], overlap: 2.0, ..record_of(&sky) };
-            let pooled =
-                tables.write(Level::detect(), &sky.hemisphere(), (0.0, 0.5), &mut registers).unwrap();
-            assert!(cache.insert_with(record, Some((&pooled, &registers))));
-        }
-        let bsdf = Bsdf::Conductor(Conductor { f0: Rgb::new(0.9, 0.6, 0.3), alpha: 0.3 });
-        let lobe = served.find(&bsdf, 1.0).unwrap();
-        let at = |x: f32| {
-            let point = QueryPoint::open(Vec3::new(x, 0.0, 0.0), Vec3::Z);
-            let viewer = Viewer { lobe: &lobe, direction: Vec3::Z };
-            cache.reflected(Level::detect(), &point, &viewer, false).map(|radiance| radiance.x)
-        };
-        let here = at(0.01).unwrap();
-        assert_eq!((at(0.14), at(0.71)), (Some(here), None));
-        // Half floats of the coefficients.
-        for (x, wanted) in [(0.26, 2.0), (0.2, 1.5), (0.69, 2.0)] {
-            assert!((at(x).unwrap() / here - wanted).abs() < 2e-3, "{x}: {:?} {here}", at(x));
-        }
+        let skies = [1.0, 2.0].map(|light| Sky::new(N, move |_| light));
+        let record =
+            |x, sky| Record { position: [x, 0.0, 0.0], radii: [0.15; 2], overlap: 2.0, ..record_of(sky) };
+        let records = [(0.0, &skies[0]), (0.4, &skies[1])].map(|(x, sky)| (record(x, sky), Some(sky)));
+        with_records(served, &records, |cache| {
+            let bsdf = Bsdf::Conductor(Conductor { f0: Rgb::new(0.9, 0.6, 0.3), alpha: 0.3 });
+            let lobe = served.find(&bsdf, 1.0).unwrap();
+            let at = |x: f32| {
+                let point = QueryPoint::open(Vec3::new(x, 0.0, 0.0), Vec3::Z);
+                let viewer = Viewer { lobe: &lobe, direction: Vec3::Z };
+                cache.reflected(Level::detect(), &point, &viewer, false).map(|radiance| radiance.x)
+            };
+            let here = at(0.01).unwrap();
+            assert_eq!((at(0.14), at(0.71)), (Some(here), None));
+            // Half floats of the coefficients.
+            for (x, wanted) in [(0.26, 2.0), (0.2, 1.5), (0.69, 2.0)] {
+                assert!((at(x).unwrap() / here - wanted).abs() < 2e-3, "{x}: {:?} {here}", at(x));
+            }
+        });
     });
 }
 
