@@ -6,7 +6,7 @@ Ours: `--method auto` for the given seconds of one thread. Mitsuba: `path` and `
 samples that it makes in these seconds of the processor.
 LuxCore, where `LUXCORE` names the python of a virtual environment that has it, and where it has the words for a
 scene: `BIDIRVMCPU` and `PATHCPU` with its caustic cache, with three radii each. All of 128 x 128 pixels, judged
-by the references of `methods.py`, whose own noise is subtracted. Efficiency is 1 / (relMSE x seconds).
+by the references of `methods.py`. Efficiency is 1 / (relMSE x seconds).
 """
 
 import argparse
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import workbench
 from caustics import LUX_METHODS, LUX_RADII, budgeted, luxcore, lux_scene, theirs
-from measure import relmse
+from measure import relmse_of_pair
 from methods import SIZE, reference, render
 from mitsuba_scene import mitsuba_scene
 from published import published
@@ -63,12 +63,12 @@ def compare(name, a, folder):
     description = published(name, SIZE)
     toml = Path(folder) / f"{name}.toml"
     write_scene(toml, description)
-    converged, left = reference(name, toml, REFERENCE_SECONDS)
+    pair = reference(name, toml, REFERENCE_SECONDS)
 
     def measured(runs):
         """Geometric mean of relMSE, mean seconds, mean of the pictures over that of the reference."""
-        errors = [max(relmse(picture, converged) - left, 1e-9) for picture, _ in runs]
-        mean = np.mean([picture.mean() for picture, _ in runs]) / converged.mean()
+        errors = [max(relmse_of_pair(picture, pair), 1e-9) for picture, _ in runs]
+        mean = np.mean([picture.mean() for picture, _ in runs]) / pair.mean()
         return float(np.exp(np.mean(np.log(errors)))), float(np.mean([seconds for _, seconds in runs])), mean
 
     seeds = range(1, a.seeds + 1)

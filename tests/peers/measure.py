@@ -10,6 +10,12 @@ def relmse(picture, reference):
     return float(np.mean((picture - reference) ** 2 / _weight(reference)))
 
 
+def relmse_of_pair(picture, pair):
+    """relMSE against two independent converged pictures: in the product of both differences their noise cancels."""
+    first, second = pair
+    return float(np.mean((picture - first) * (picture - second) / _weight((first + second) / 2)))
+
+
 def relmse_of_noise(variance, reference):
     """What `relmse` shows, in the mean, for a picture without bias whose pixels have this variance."""
     return float(np.mean(variance / _weight(reference)))

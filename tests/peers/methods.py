@@ -4,9 +4,9 @@
 
 `--rooms` measures rooms by random numbers (random_rooms.py) in place of the scenes. A second table has the mean of the pictures over that of the reference, and how many standard errors it is from one: z, by
 the spread of two or more seeds. Biased methods may differ; others may not. Each method renders 128 x 128 pixels for the seconds of a budget on one thread, one seed after the other. The table
-has relMSE; the regret of `auto` is its error over that of the best other method. References are pictures of
-another seed by a method that suits the scene, kept in the output folder; the noise that they estimate of
-themselves is subtracted. Runs are kept, too: a second call renders those that are missing. Needs numpy, and
+has relMSE; the regret of `auto` is its error over that of the best other method. References are pairs of
+pictures of other seeds by a method that suits the scene, kept in the output folder: in the product of the
+differences from both their noise cancels. Runs are kept, too: a second call renders those that are missing. Needs numpy, and
 the published scenes in HALFLIGHT_SCENES.
 """
 
@@ -22,7 +22,8 @@ from pathlib import Path
 import numpy as np
 
 import random_rooms
-from ablation import OWN, ROOT, read_pfm, relmse
+from ablation import OWN, ROOT, read_pfm
+from measure import relmse, relmse_of_pair
 from published import published
 from scene_file import write_scene
 
@@ -36,7 +37,7 @@ HARD = Path(__file__).resolve().parent / "scenes" / "hard"
 SCENES = {
     "cornell-box-bitterli": "path", "cbox-mitsuba": "path", "living-room": "path", "staircase": "path",
     "sponza-dabrovic": "path", "veach-ajar": "path", "veach-door": "bdpt",
-    "veach-bidir": "bdpt", "lux-causticcube": "sppm", "torus": "sppm", "caustic-glass": "vcm",
+    "veach-bidir": "bdpt", "lux-causticcube": "sppm", "torus": "path", "caustic-glass": "vcm",
     "water-caustic": "sppm", "two-rooms": "bdpt", "glossy": "path", "caustic": "path", "up-light": "path",
     "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "path",
 }
@@ -75,25 +76,30 @@ def render(scene, flags, threads=1):
 
 
 def reference(name, scene, seconds):
-    """A converged picture and the relMSE that is left in it, by its own estimate."""
+    """Two converged pictures of seeds of their own."""
     kept = OUTPUT / f"{name}.npz"
     if not kept.exists():
-        flags = ["--time", f"{seconds}s", "--seed", "1000", "--method", reference_method(name)]
-        picture, facts = render(scene, flags)
-        np.savez(kept, picture=picture, relmse=facts["error"]["relmse"])
-        print(f"# {name}: {facts['method']}, {facts['spp']} spp, relMSE {facts['error']['relmse']:.2e}", flush=True)
-    data = np.load(kept)
-    return data["picture"], float(data["relmse"])
+        flags = ["--time", f"{seconds}s", "--method", reference_method(name)]
+        pair = [render(scene, [*flags, "--seed", seed])[0] for seed in ("1000", "1001")]
+        np.savez(kept, pair=pair)
+        print(f"# {name}: {reference_method(name)}, mean with relMSE {left(pair):.2e}", flush=True)
+    return np.load(kept)["pair"]
+
+
+def left(pair):
+    """Relative variance of the mean of two pictures."""
+    mean = (pair[0] + pair[1]) / 2
+    return relmse(pair[0], mean)
 
 
 def one(job):
     """Row of the log: a method on a scene for a budget."""
-    name, scene, method, budget, seed, (converged, left) = job
+    name, scene, method, budget, seed, pair = job
     flags = ["--time", f"{budget}s", "--seed", str(seed), "--method", method]
     picture, facts = render(scene, flags)
-    error = max(relmse(picture, converged) - left, 1e-9)
+    error = max(relmse_of_pair(picture, pair), 1e-9)
     return {"scene": name, "method": method, "chosen": facts["method"], "budget": budget, "seed": seed, "spp": facts["spp"],
-            "relmse": error, "mean": float(picture.mean() / converged.mean()), "seconds": facts["seconds"]["render"]}
+            "relmse": error, "mean": float(picture.mean() / pair.mean()), "seconds": facts["seconds"]["render"]}
 
 
 def main():
@@ -154,10 +160,10 @@ def table(rows, budget):
         print(f"\nGeometric mean of the regret: {math.exp(sum(map(math.log, regrets)) / len(regrets)):.2f}")
 
 
-def mean_error(picture, left):
-    """Relative standard error of the mean of a picture whose pixels have the relMSE `left`."""
-    weights = picture**2 + 0.01 * picture.mean() ** 2
-    return math.sqrt(left * float(weights.sum())) / float(picture.sum())
+def mean_error(pair):
+    """Relative standard error of the mean of both pictures, by their difference."""
+    difference = (pair[0] - pair[1]) / 2
+    return float(np.sqrt((difference**2).sum()) / ((pair[0] + pair[1]) / 2).sum())
 
 
 def agreement(rows, budget, references):
@@ -166,7 +172,7 @@ def agreement(rows, budget, references):
     print(f"\nmeans after {budget:g} s\n\n| scene | reference | " + " | ".join(methods) + " |")
     print("|---" * (len(methods) + 2) + "|")
     for scene in dict.fromkeys(row["scene"] for row in rows):
-        own = mean_error(*references[scene])
+        own = mean_error(references[scene])
         cells = []
         for method in methods:
             means = np.array([row["mean"] for row in rows if (row["scene"], row["method"]) == (scene, method)])

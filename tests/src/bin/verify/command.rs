@@ -4,6 +4,7 @@ use crate::{Failure, Outcome};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::thread;
 
 /// `program arguments…` in `directory`, split at spaces.
 pub(crate) fn command(directory: &Path, line: &str) -> Command {
@@ -67,6 +68,18 @@ pub(crate) fn output(command: &mut Command) -> Outcome {
         Ok(out) => Err(Failure::Failed(format!("`{shown}`: {}", out.status))),
         Err(error) => Err(Failure::Missing(format!("`{shown}` does not start: {error}"))),
     }
+}
+
+/// Results of `check` for all `items`, two at a time: each keeps one processor busy.
+pub(crate) fn in_pairs<T: Sync, R: Send>(items: &[T], check: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let pairs = items.chunks(2).flat_map(|pair| {
+        thread::scope(|scope| {
+            let jobs: Vec<_> = pair.iter().map(|item| scope.spawn(|| check(item))).collect();
+            let done = jobs.into_iter().map(|job| job.join().expect("a check does not panic"));
+            done.collect::<Vec<_>>()
+        })
+    });
+    pairs.collect()
 }
 
 /// Whether a program can be started.

@@ -1,7 +1,7 @@
 //! A short run of every fuzz target from its corpus: by cargo-fuzz if it and a nightly toolchain are
 //! installed, else by the driver `mutate`.
 
-use crate::command::{fresh_cargo, output, run};
+use crate::command::{fresh_cargo, in_pairs, output, run};
 use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::process::{Command, Stdio};
@@ -26,7 +26,7 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
     // Smoke runs end after a fixed number of runs, so that every machine has the same result; campaigns end
     // by the clock.
     let runs = if seconds <= SMOKE_SECONDS { SMOKE_RUNS } else { -1 };
-    for target in &targets {
+    let results = in_pairs(&targets, |target| {
         if coverage {
             // libFuzzer writes new inputs to the first directory; the second is the corpus of the repository.
             fs::create_dir_all(folder.join("corpus-run").join(target)).map_err(io)?;
@@ -35,15 +35,17 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
                  -seed=1 -runs={runs} -max_total_time={seconds} -timeout=10 -verbosity=0 -print_final_stats=1"
             );
             // No leak detection: it needs ptrace, which sandboxes forbid.
-            run(fresh_cargo(&folder, &line).env("ASAN_OPTIONS", "detect_leaks=0"))?;
+            run(fresh_cargo(&folder, &line).env("ASAN_OPTIONS", "detect_leaks=0"))
         } else {
             let line = format!(
                 "cargo run --quiet --release --locked --target-dir target/stable --no-default-features --features app --bin mutate -- \
                  {target} --seconds {seconds} --runs {runs} --seed 1"
             );
             println!("{}", output(&mut fresh_cargo(&folder, &line))?);
+            Ok(())
         }
-    }
+    });
+    results.into_iter().collect::<Result<(), Failure>>()?;
     let driver = if coverage { "libFuzzer" } else { "the stable driver (no cargo-fuzz or no nightly here)" };
     Ok(format!("{} targets, {seconds} s each, by {driver}", targets.len()))
 }

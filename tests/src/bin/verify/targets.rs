@@ -1,12 +1,11 @@
 //! The tiny render (`core/examples/tiny_render.rs`) on every constrained target: it must build, and where it
 //! can run its bits must equal those of the ordinary example.
 
-use crate::command::{command, exists, fresh_cargo, output, run};
+use crate::command::{command, exists, fresh_cargo, in_pairs, output, run};
 use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::thread;
 
 /// One build of the tiny render.
 struct Build {
@@ -76,17 +75,9 @@ pub(crate) fn check(project: &Project) -> Outcome {
     let is_fingerprint = |line: &&str| line.len() == 16 && line.bytes().all(|byte| byte.is_ascii_hexdigit());
     let expected: Vec<&str> = picture.lines().filter(is_fingerprint).collect();
 
-    // All builds are tried, so that a missing tool hides no failure. Each has one unit of code generation,
-    // which keeps one processor busy: two builds at a time.
-    let mut results = Vec::new();
-    for pair in BUILDS.chunks(2) {
-        thread::scope(|scope| {
-            let jobs: Vec<_> =
-                pair.iter().map(|build| scope.spawn(|| one(project, build, &expected))).collect();
-            let done = jobs.into_iter().map(|job| job.join().expect("a check does not panic"));
-            results.extend(pair.iter().zip(done));
-        });
-    }
+    // All builds are tried, so that a missing tool hides no failure. Each has one unit of code generation.
+    let results: Vec<_> =
+        BUILDS.iter().zip(in_pairs(BUILDS, |build| one(project, build, &expected))).collect();
     for (build, result) in &results {
         let text = match result {
             Ok(text) | Err(Failure::Missing(text)) | Err(Failure::Failed(text)) => text,
