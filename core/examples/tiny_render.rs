@@ -17,7 +17,9 @@ use halflight_core::method::metropolis::{Metropolis, MetropolisSettings};
 use halflight_core::method::path::PathTracing;
 use halflight_core::method::photon_map::PhotonMapping;
 use halflight_core::method::sppm::ProgressivePhotonMapping;
-use halflight_core::method::{Loop, Method, PhotonSettings, RenderContext, RenderState, Round, Shard};
+use halflight_core::method::{
+    Loop, Method, PhotonSettings, PilotSize, RenderContext, RenderState, Round, Shard,
+};
 use halflight_core::transport::{PathSettings, UNLIMITED};
 use halflight_core::{Level, Rgb};
 
@@ -64,8 +66,14 @@ pub fn render(
     let lights = LightSampler::build(&scene, &mut arena)?;
     let mut state = RenderState::new(size, size, Shard::WHOLE, &mut arena)?;
     let settings = PathSettings { width: size, height: size, seed: 1, max_depth: UNLIMITED };
-    let context =
-        RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level: Level::BASELINE };
+    let context = RenderContext {
+        scene: &scene,
+        bvh: &bvh,
+        lights: &lights,
+        settings,
+        level: Level::BASELINE,
+        pilots: PilotSize::USUAL,
+    };
 
     // Working memory of tasks, less than Method::scratch() where they take one sample after the other.
     let paths = if method == 4 { 8192 } else { 1024 };

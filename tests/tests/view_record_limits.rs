@@ -12,7 +12,7 @@ use halflight_core::cache::radiance::LobeSettings;
 use halflight_core::light::{LightSampler, luminance};
 use halflight_core::memory::{Arena, Buffer, Line};
 use halflight_core::method::irradiance_cache::{CacheSettings, FILLED, IrradianceCaching};
-use halflight_core::method::{Loop, RenderContext, RenderState, Round, Shard};
+use halflight_core::method::{Loop, PilotSize, RenderContext, RenderState, Round, Shard};
 use halflight_core::transport::{PathSettings, UNLIMITED};
 use halflight_tests::scenes::{TABLE_FLOOR, TABLE_LEG, TABLE_LEGS, metal, table_in_the_sun};
 
@@ -51,8 +51,14 @@ fn records(seed: u32) -> [Vec<Record>; 2] {
     let lights = LightSampler::build(&scene, &mut arena).unwrap();
     let mut state = RenderState::new(SIZE, SIZE, Shard::WHOLE, &mut arena).unwrap();
     let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth: UNLIMITED };
-    let context =
-        RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level: Level::BASELINE };
+    let context = RenderContext {
+        scene: &scene,
+        bvh: &bvh,
+        lights: &lights,
+        settings,
+        level: Level::BASELINE,
+        pilots: PilotSize::USUAL,
+    };
     let cache = CacheSettings {
         metric: Metric::Halflight,
         error: ERROR,

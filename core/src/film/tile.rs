@@ -44,6 +44,24 @@ impl Tile {
         Self { left: (index % across) as u32 * TILE, top: (index / across) as u32 * TILE, width, height }
     }
 
+    /// Indices of `count` tiles at most, 16 or fewer, that are spread over a picture: cells of the first
+    /// points of a (0, 2)-sequence. All tiles of a small picture.
+    pub fn spread_over(width: u32, height: u32, count: usize) -> impl Iterator<Item = usize> {
+        let all = Self::count(width, height);
+        let [across, down] = [width, height].map(|size| u64::from(size.div_ceil(TILE)));
+        // Points of sixteen lie in the middle of their intervals.
+        let cell = |bits: u32, cells: u64| (2 * u64::from(bits >> 28) + 1) * cells / 32;
+        let tile = move |i: usize| match all <= count {
+            true => i,
+            false => {
+                let [x, y] = zero_two_point(i as u32);
+                (cell(y, down) * across + cell(x, across)) as usize
+            }
+        };
+        let is_new = move |i: &usize| (0..*i).all(|earlier| tile(earlier) != tile(*i));
+        (0..count.min(all)).filter(is_new).map(tile)
+    }
+
     /// Column and row of the upper left pixel.
     #[inline]
     pub const fn corner(&self) -> [u32; 2] {
@@ -92,6 +110,14 @@ impl Tile {
         let tile = (y / TILE) as usize * width.div_ceil(TILE) as usize + (x / TILE) as usize;
         tile * PIXELS_PER_TILE + Self::index_of_place(x, y)
     }
+}
+
+/// Point `i` of the (0, 2)-sequence of van der Corput and Sobol', in units of 2⁻³².
+fn zero_two_point(i: u32) -> [u32; 2] {
+    let bits = (0..32).filter(|bit| i >> bit & 1 == 1);
+    // Column k of Sobol's matrix is that of Pascal's triangle modulo two.
+    let column = |bit| (0..bit).fold(1u32 << 31, |column, _| column ^ column >> 1);
+    [i.reverse_bits(), bits.map(column).fold(0, |sum, column| sum ^ column)]
 }
 
 /// Size in pixels of the tiles that cover `size` pixels.
@@ -157,5 +183,38 @@ impl PixelSet {
     /// True if the set is empty.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::vec::Vec;
+
+    #[test]
+    fn tiles_are_spread_over_rows_and_columns() {
+        for [width, height] in [[128u32, 128u32], [512, 512], [1024, 320], [64, 2000]] {
+            let across = width.div_ceil(TILE) as usize;
+            let down = height.div_ceil(TILE) as usize;
+            for (count, parts) in [(4, 2), (16, 4)] {
+                let tiles: Vec<_> = Tile::spread_over(width, height, count).collect();
+                // Each part of the picture has one, unless its parts are narrower than tiles.
+                let part = |tile: &usize| (tile % across * parts / across, tile / across * parts / down);
+                let seen: BTreeSet<_> = tiles.iter().map(part).collect();
+                assert_eq!((tiles.len(), seen.len()), (count, count), "{width} x {height}: {tiles:?}");
+                assert!(tiles.iter().all(|tile| *tile < Tile::count(width, height)));
+            }
+        }
+    }
+
+    #[test]
+    fn all_tiles_of_a_small_picture_are_taken_once() {
+        for [width, height] in [[16, 16], [64, 64], [300, 5], [90, 70], [32, 1000]] {
+            let tiles: Vec<_> = Tile::spread_over(width, height, 16).collect();
+            let different: BTreeSet<_> = tiles.iter().collect();
+            assert_eq!(different.len(), tiles.len());
+            assert!(tiles.len() >= Tile::count(width, height).min(12), "{width} x {height}: {tiles:?}");
+        }
     }
 }

@@ -15,7 +15,8 @@ use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::caustics::{self, CausticPathTracing};
 use super::counts::{self, PilotNoise, pilot};
 use super::executor::{Executor, Passed};
-use super::{RenderContext, work_of_detail};
+use super::pilot::PILOT_TILES;
+use super::{PilotSize, RenderContext, work_of_detail};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::cache::radiance::{LobeSettings, ServedLobes};
@@ -25,7 +26,6 @@ use crate::findings::Decision::Used;
 use crate::findings::{Finding, Value};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::cached::view;
-use crate::transport::path::reuse_pilot::PILOT_TILES;
 use crate::transport::path::{LightEstimator, WAVE};
 use crate::transport::{Counters, PathIntegrator, PathSettings, SuppliedLobes};
 use goal::SAMPLES;
@@ -39,7 +39,10 @@ const PILOT_SHARE: f64 = 0.08;
 
 /// Work of a pixel of the pilot, and the fraction of the work that its pixels may take where it is larger.
 const RAYS_OF_PILOT_PIXEL: f64 = 300.0;
-const PILOT_PIXELS: f64 = 0.02;
+const PILOT_PIXELS: f64 = 0.01;
+
+/// Pixels of the picture for each of the pilot of counts, at most.
+const MOST_PART: usize = 4 * pilot::PART;
 
 /// Work of a ray of cached paths in a scene of few triangles, with its share of look-ups. It is below one
 /// because noise of light samples falls faster than with the inverse of their number.
@@ -187,7 +190,7 @@ impl Trial {
         // Lobes of a scene with little memory are left to paths.
         let tables = if F::GLOSSY && memory.has(tables) { tables } else { Footprint::default() };
         let (has_photons, reuse) = (paths.finding().used, paths.reuse());
-        let mean = f64::from(paths.mean_radiance(executor)?);
+        let picture = (f64::from(paths.mean_radiance(executor)?), context.pilots);
         let (tiles, has_lobes) = memory.lend("lobes", tables, |_, arena| {
             let wide = match tables.bytes() {
                 0 => None,
@@ -203,14 +206,14 @@ impl Trial {
                 [SuppliedLobes::default(), supplied].map(|lobes| all.without_cached_light(lobes));
             let second = has_lobes.then_some(second);
             let tiles = match paths.photons() {
-                None => trace(&all, (&first, second.as_ref()), mean, executor)?,
+                None => trace(&all, (&first, second.as_ref()), picture, executor)?,
                 Some(photons) => photons.lend(|photons| match photons {
                     Some(photons) => {
                         let first = first.with_caustics(photons);
                         let second = second.map(|second| second.with_caustics(photons));
-                        trace(&all.with_caustics(photons), (&first, second.as_ref()), mean, executor)
+                        trace(&all.with_caustics(photons), (&first, second.as_ref()), picture, executor)
                     }
-                    None => trace(&all, (&first, second.as_ref()), mean, executor),
+                    None => trace(&all, (&first, second.as_ref()), picture, executor),
                 })??,
             };
             Ok((tiles, has_lobes))
@@ -304,7 +307,7 @@ impl Trial {
         match *goal {
             Goal { rays: Some(rays), samples: None, error: None } => {
                 let pixels = PILOT_PIXELS * rays / RAYS_OF_PILOT_PIXEL;
-                ((self.pixels / pixels) as usize).clamp(1, pilot::PART)
+                ((self.pixels / pixels) as usize).clamp(1, MOST_PART)
             }
             _ => pilot::PART,
         }
@@ -364,12 +367,12 @@ impl Trial {
 fn trace<F: Features, A: LightEstimator<F>, B: LightEstimator<F>>(
     all: &PathIntegrator<F, A>,
     (first, second): (&PathIntegrator<F, B>, Option<&PathIntegrator<F, B>>),
-    mean: f64,
+    (mean, pilots): (f64, PilotSize),
     executor: &mut impl Executor,
 ) -> Result<Option<[TileTrial; PILOT_TILES]>, OutOfMemory> {
     let mut tiles = [TileTrial::default(); PILOT_TILES];
     let Passed { is_complete, .. } =
-        executor.pass(all.pilot_tasks().zip(tiles.iter_mut()), |_, (tile, out), worker| {
+        executor.pass(all.pilot_tasks(pilots.tiles()).zip(tiles.iter_mut()), |_, (tile, out), worker| {
             let mut arena = worker.scratch.scratch();
             let pixels = arena.slice::<Pixel>(SUPPLIES * PIXELS_PER_TILE)?;
             pixels.fill(Pixel::default());

@@ -1,6 +1,6 @@
 //! A closed box with a lamp under its ceiling, for tests of methods: a Cornell box, or a furnace.
 
-use super::RenderContext;
+use super::{PilotSize, RenderContext};
 use crate::bvh::Bvh;
 use crate::light::LightSampler;
 use crate::memory::{Arena, Line};
@@ -61,5 +61,12 @@ pub(super) fn with_box<T>(materials: [Material; 4], work: impl FnOnce(&RenderCon
     let mut lights = vec![Line([0; 64]); footprint.bytes() / 64];
     let lights = LightSampler::build(&scene, &mut Arena::over(&mut lights)).unwrap();
     let settings = PathSettings { width: SIDE, height: SIDE, seed: 1, max_depth: UNLIMITED };
-    work(&RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level: Level::detect() })
+    work(&RenderContext {
+        scene: &scene,
+        bvh: &bvh,
+        lights: &lights,
+        settings,
+        level: Level::detect(),
+        pilots: PilotSize::USUAL,
+    })
 }

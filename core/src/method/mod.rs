@@ -46,6 +46,7 @@ pub fn rays_per_second(triangles: usize) -> f64 {
 pub use executor::{Executor, Loop, Passed, Worker};
 pub use photon_map_store::{PhotonMapPair, PhotonMapStore};
 pub use photons::{MapUse, PhotonSettings, PhotonUse};
+pub use pilot::PilotSize;
 pub use round::{RenderState, Round, Shard};
 
 use crate::Level;
@@ -71,6 +72,8 @@ pub struct RenderContext<'a> {
     pub settings: PathSettings,
     /// Highest instruction set to use.
     pub level: Level,
+    /// Size of the pilots.
+    pub pilots: PilotSize,
 }
 
 impl<'a> RenderContext<'a> {

@@ -2,7 +2,7 @@
 //! 9), and path reuse among neighbouring pixels (Bekaert et al. 2002) where a pilot finds that it pays.
 
 use super::executor::Executor;
-use super::{Method, RenderContext, Round, pilot};
+use super::{Method, PilotSize, RenderContext, Round, pilot};
 use crate::bsdf::Features;
 use crate::findings::Decision::{LeftOut, Used};
 use crate::findings::{Finding, Findings, Value};
@@ -37,6 +37,7 @@ impl Reuse {
 #[derive(Clone, Copy)]
 pub struct PathTracing<'a, F> {
     integrator: PathIntegrator<'a, F>,
+    pilots: PilotSize,
     reuse: Reuse,
     /// Mean radiance of the picture, once it was measured.
     mean: Option<f32>,
@@ -57,25 +58,26 @@ impl<'a, F: Features> PathTracing<'a, F> {
         reuse: Option<bool>,
         executor: &mut impl Executor,
     ) -> Result<Self, OutOfMemory> {
-        let integrator = context.integrator::<F>();
+        let (integrator, pilots) = (context.integrator::<F>(), context.pilots);
         let (reuse, mean) = match reuse {
             Some(false) => (Reuse::default(), None),
             Some(true) => {
-                let mean = pilot::mean_radiance(&integrator, executor)?;
+                let mean = pilot::mean_radiance(&integrator, pilots, executor)?;
                 (Reuse { used: true, pilot: None }, Some(mean))
             }
             None => {
-                let mean = pilot::mean_radiance(&integrator, executor)?;
-                let pilot = pilot::variance(&integrator, mean, executor)?;
+                let mean = pilot::mean_radiance(&integrator, pilots, executor)?;
+                let pilot = pilot::variance(&integrator, (mean, pilots), executor)?;
                 (Reuse { used: pilot.pays(), pilot: Some(pilot) }, Some(mean))
             }
         };
-        Ok(Self { integrator, reuse, mean })
+        Ok(Self { integrator, pilots, reuse, mean })
     }
 
     /// The same without reuse and without a pilot, for measurements before another method's picture.
     pub fn plain(context: &RenderContext<'a>) -> Self {
-        Self { integrator: context.integrator(), reuse: Reuse::default(), mean: None }
+        let (integrator, pilots) = (context.integrator(), context.pilots);
+        Self { integrator, pilots, reuse: Reuse::default(), mean: None }
     }
 
     /// Its path tracer, without reuse.
@@ -101,7 +103,7 @@ impl<'a, F: Features> PathTracing<'a, F> {
     pub fn mean_radiance(&mut self, executor: &mut impl Executor) -> Result<f32, OutOfMemory> {
         let mean = match self.mean {
             Some(mean) => mean,
-            None => pilot::mean_radiance(&self.integrator, executor)?,
+            None => pilot::mean_radiance(&self.integrator, self.pilots, executor)?,
         };
         self.mean = Some(mean);
         Ok(mean)
@@ -112,7 +114,8 @@ impl<'a, F: Features> PathTracing<'a, F> {
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is too small.
     pub fn variance(&self, mean: f32, executor: &mut impl Executor) -> Result<Pilot, OutOfMemory> {
-        self.reuse.pilot.map_or_else(|| pilot::variance(&self.integrator, mean, executor), Ok)
+        let measured = (mean, self.pilots);
+        self.reuse.pilot.map_or_else(|| pilot::variance(&self.integrator, measured, executor), Ok)
     }
 }
 

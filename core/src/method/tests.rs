@@ -7,7 +7,9 @@ use super::instant_radiosity::{InstantRadiosity, VirtualLightSettings, VirtualLi
 use super::path::PathTracing;
 use super::photon_map::PhotonMapping;
 use super::sppm::ProgressivePhotonMapping;
-use super::{Loop, MapUse, Method, PhotonSettings, PhotonUse, RenderContext, RenderState, Round, Shard};
+use super::{
+    Loop, MapUse, Method, PhotonSettings, PhotonUse, PilotSize, RenderContext, RenderState, Round, Shard,
+};
 use crate::bsdf::All;
 use crate::bvh::Bvh;
 use crate::film::Pixel;
@@ -63,7 +65,14 @@ pub(super) fn with_room(check: impl FnOnce(&RenderContext)) {
     let mut lights = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
     let lights = LightSampler::build(&scene, &mut Arena::over(&mut lights)).unwrap();
     let settings = PathSettings { width: 20, height: 20, seed: 1, max_depth: 8 };
-    check(&RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level: Level::BASELINE });
+    check(&RenderContext {
+        scene: &scene,
+        bvh: &bvh,
+        lights: &lights,
+        settings,
+        level: Level::BASELINE,
+        pilots: PilotSize::USUAL,
+    });
 }
 
 /// Brings a film to `spp` samples by `round`, in rounds of `samples` and steps of `step`; returns its pixels.

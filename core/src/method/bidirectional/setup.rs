@@ -9,6 +9,7 @@ use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::method::emission_guide::{EmissionGuide, GuideSettings, Target};
+use crate::method::pilot::PILOT_TILES;
 use crate::method::splats::splats_of_tile;
 use crate::method::{Executor, PhotonMapStore, RenderContext, caustics};
 use crate::transport::bidirectional::light_pass::{PATHS_PER_TASK, TaskOutput, VERTICES_PER_TASK};
@@ -27,9 +28,6 @@ const WIDEST_RADIUS: f64 = 4.0;
 
 /// Ratio of the light of merges and splats to all other from which on radii grow.
 const WIDENING_RATIO: f64 = 0.8;
-
-/// Tiles that show this ratio.
-const PILOT_TILES: usize = 16;
 
 impl<'a, F: Features> Bidirectional<'a, F> {
     /// Memory of `tasks` of light paths, with room for `vertices`.
@@ -135,9 +133,8 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         let (all, picture) = self.camera_paths(light)?;
         let Some(others) = all.without_light_of_merges() else { return Ok(0.0) };
         let mut shares = [(0.0, 0u32); PILOT_TILES];
-        let tiles = Tile::count(settings.width, settings.height);
-        let _ = executor.pass(shares.iter_mut().take(tiles), |number, share, worker| {
-            let tile = number * tiles / PILOT_TILES.min(tiles);
+        let tiles = Tile::spread_over(settings.width, settings.height, PILOT_TILES);
+        let _ = executor.pass(tiles.zip(shares.iter_mut()), |_, (tile, share), worker| {
             let mut arena = worker.scratch.scratch();
             let pixels: &mut [Pixel] = arena.slice(2 * PIXELS_PER_TILE)?;
             pixels.fill(Pixel::default());

@@ -156,12 +156,12 @@ impl<'a> CausticPhotons<'a> {
             return Ok(false);
         }
         let (benefit, has_reuse) = (self.emission.benefit, paths.reuse().used);
-        let mean = benefit.mean as f32;
-        let alone = benefit.path_tracing(&paths.variance(mean, executor)?, has_reuse);
+        let measured = (benefit.mean as f32, self.context.pilots);
+        let alone = benefit.path_tracing(&paths.variance(measured.0, executor)?, has_reuse);
         let integrator = paths.integrator();
         let joined = self.lend(|photons| match photons {
-            Some(photons) => pilot::variance(&integrator.with_caustics(photons), mean, executor),
-            None => pilot::variance(integrator, mean, executor),
+            Some(photons) => pilot::variance(&integrator.with_caustics(photons), measured, executor),
+            None => pilot::variance(integrator, measured, executor),
         })??;
         let light_rays = counters.rays as f64 / (2.0 * self.context.pixels() as f64);
         Ok(alone.exceeds(&joined, has_reuse, light_rays))

@@ -59,10 +59,11 @@ fn lent(lights: &LightSampler, step: usize) -> Footprint {
 }
 
 /// Light paths of a step that there is memory for within `available` bytes.
-fn step(lights: &LightSampler, available: usize) -> usize {
+fn step(context: &RenderContext, available: usize) -> usize {
+    let (lights, wanted) = (context.lights, PATHS_PER_TASK * context.pilots.of(STEP / PATHS_PER_TASK));
     let left = available.saturating_sub(kept(lights).and(lent(lights, 0)).bytes());
     let task = Footprint::default().slice::<GuideSample>(PATHS_PER_TASK);
-    (left / task.bytes() * PATHS_PER_TASK).clamp(FIRST_TEST, STEP)
+    (left / task.bytes() * PATHS_PER_TASK).clamp(FIRST_TEST, wanted.max(FIRST_TEST))
 }
 
 /// Runs a prepass for a picture of `context`; `paths` measure it without photons.
@@ -77,7 +78,7 @@ pub fn prepass<'a, F: Features>(
     executor: &mut impl Executor,
 ) -> Result<Prepass<'a>, OutOfMemory> {
     let RenderContext { scene, bvh, lights, .. } = *context;
-    let step = step(lights, memory.available());
+    let step = step(context, memory.available());
     let (kept, lent) = (kept(lights), lent(lights, step));
     let later = kept.and(least_footprint()).bytes().saturating_add(settings.reserved);
     if !memory.has(kept.and(lent)) || later > memory.available() {
@@ -160,13 +161,13 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
     /// visible lamp, or a path that meets one through glass, may be nearly all of that, or be absent by
     /// chance.
     fn other_light(&mut self, sampler: &EmissionSampler) -> Result<f32, OutOfMemory> {
-        let LightPaths { radii, beside_records, ref found, ref mut executor, .. } = self.light_paths;
+        let LightPaths { context, radii, beside_records, ref found, ref mut executor } = self.light_paths;
         // Weights alone: an empty map adds no light.
         let mut line = [Line([0; _])];
         let empty = Photons::new(0, &mut Arena::over(&mut line))?.build(0);
         let merging = CausticMerging::new([&empty; 2], sampler, radii, found.len() as u32);
         let integrator = self.paths.integrator().with_caustics(merging.beside_records(beside_records));
-        pilot::mean_radiance_without_photons(&integrator, *executor)
+        pilot::mean_radiance_without_photons(&integrator, context.pilots, *executor)
     }
 
     /// True if photons may pay. Records supply indirect light without its noise.
@@ -174,13 +175,13 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         if benefit.pays() {
             return Ok(true);
         }
-        let LightPaths { beside_records, ref mut executor, .. } = self.light_paths;
+        let LightPaths { context, beside_records, ref mut executor, .. } = self.light_paths;
         let mean = benefit.mean as f32;
         let noise = match beside_records {
             false => self.paths.variance(mean, *executor)?.noise(self.paths.reuse().used),
             true => {
                 let paths = self.paths.integrator().without_cached_light(SuppliedLobes::default());
-                pilot::variance(&paths, mean, *executor)?.noise(false)
+                pilot::variance(&paths, (mean, context.pilots), *executor)?.noise(false)
             }
         };
         Ok(benefit.pays_beside(noise))
@@ -249,7 +250,7 @@ pub fn unseen<'m, F: Features>(
         light_paths.trace::<F>(&by_power, STEP, AUDIT_MAP)?;
         let LightPaths { found, executor, .. } = light_paths;
         let missing = missing(found, FIRST_RADIUS, context.pixels() as f64, (samples, FEWEST_HITS));
-        let mean = f64::from(pilot::mean_radiance(&context.integrator::<F>(), executor)?);
+        let mean = f64::from(pilot::mean_radiance(&context.integrator::<F>(), context.pilots, executor)?);
         Ok((missing > 0.0).then(|| missing / (missing + mean)))
     })
 }

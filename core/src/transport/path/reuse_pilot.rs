@@ -21,9 +21,6 @@ use bytemuck::Pod;
 /// Samples per pixel of the pilot. The mean radiance of the picture comes from sample 0 alone.
 const SAMPLES: u32 = 4;
 
-/// Tiles of a pilot: in total about the work of two samples per pixel of a thumbnail.
-pub const PILOT_TILES: usize = 16;
-
 /// Cost of a connection between two paths, in other rays including the shading of their hits (measured: 0.2
 /// in a box, 0.3 in a room of 400,000 triangles).
 const CONNECTION: f32 = 0.3;
@@ -112,10 +109,9 @@ impl core::ops::AddAssign for Pilot {
 }
 
 impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
-    /// Tiles of the pilot, spread over the picture.
-    pub fn pilot_tasks(&self) -> impl Iterator<Item = usize> + use<F, E> {
-        let (tasks, pilots) = (self.tasks(), self.tasks().min(PILOT_TILES));
-        (0..pilots).map(move |i| (2 * i + 1) * tasks / (2 * pilots))
+    /// Tiles of a pilot, `count` at most, spread over the picture.
+    pub fn pilot_tasks(&self, count: usize) -> impl Iterator<Item = usize> + use<F, E> {
+        Tile::spread_over(self.settings.width, self.settings.height, count)
     }
 
     /// Mean radiance of one tile, by one sample per pixel.

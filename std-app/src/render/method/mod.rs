@@ -43,7 +43,7 @@ use halflight_core::method::instant_radiosity::InstantRadiosity;
 use halflight_core::method::metropolis::Metropolis;
 use halflight_core::method::photon_map::PhotonMapping;
 use halflight_core::method::sppm::ProgressivePhotonMapping;
-use halflight_core::method::{Method as CoreMethod, RenderContext, rays_per_second};
+use halflight_core::method::{Method as CoreMethod, PilotSize, RenderContext, rays_per_second};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
 use prepared::Prepared;
@@ -196,12 +196,21 @@ impl<'a> RenderSetup<'a> {
         Goal { rays: self.most_rays(), samples: stop.most_samples(), error: stop.error }
     }
 
+    /// True if time alone ends the picture. A film by samples or error is resumed to the same bits.
+    fn is_timed(&self) -> bool {
+        matches!(self.goal(), Goal { rays: Some(_), samples: None, error: None })
+    }
+
+    /// Size of pilots.
+    fn pilots(&self) -> PilotSize {
+        self.most_rays().filter(|_| self.is_timed()).map_or(PilotSize::USUAL, PilotSize::of_picture)
+    }
+
     /// Whether rays and density of records may be chosen: time alone ends the picture, and neither settings
-    /// nor files fix them. A film by samples or error is resumed without the trial, to the same bits.
+    /// nor files fix them.
     pub(super) fn has_open_cache(&self) -> bool {
         let Settings { cache, load_cache, save_cache, .. } = self.settings;
-        let is_timed = matches!(self.goal(), Goal { rays: Some(_), samples: None, error: None });
-        is_timed && cache.is_open() && load_cache.is_none() && save_cache.is_none()
+        self.is_timed() && cache.is_open() && load_cache.is_none() && save_cache.is_none()
     }
 
     /// Picture of a requested cache, if its time is limited.
@@ -212,7 +221,8 @@ impl<'a> RenderSetup<'a> {
     /// Context for methods of the core.
     pub(super) fn context(&self) -> RenderContext<'a> {
         let Self { scene, bvh, lights, settings, .. } = *self;
-        RenderContext { scene, bvh, lights, settings: path_settings(settings), level: settings.level }
+        let (paths, pilots) = (path_settings(settings), self.pilots());
+        RenderContext { scene, bvh, lights, settings: paths, level: settings.level, pilots }
     }
 }
 
