@@ -224,8 +224,8 @@ pub fn table_in_the_sun(floor: Surface) -> SceneBuffers {
         buffers.cuboid(low, low + Vec3::new(TABLE_LEG, 0.25, TABLE_LEG), false, wood);
     }
     buffers.cuboid(Vec3::new(0.26, 0.251, 0.36), Vec3::new(0.74, 0.27, 0.79), false, wood);
-    let position = Vec3::new(0.02, 0.5, 0.3);
-    let direction = (Vec3::new(0.3, 0.1, 0.5) - position).normalize();
+    let position = Vec3::new(0.3, 0.35, 0.02);
+    let direction = (Vec3::new(0.3, 0.12, 0.38) - position).normalize();
     let (cos_inner, cos_outer) = (0.98, 0.95);
     buffers.lights.push(PointLight::Spot {
         position,

@@ -30,7 +30,7 @@ fn floors_and_blocks_of_narrow_lobes_agree_with_path_tracing() {
     agrees("varnished box with metal", &box_from_above(varnish(roughness(0.1)), metal(roughness(0.2))), 2);
 }
 
-/// The limits of the records have a test of their own, `view_record_limits`.
+/// The limits of the records and their light beside the legs have tests of their own, `view_record_limits`.
 #[test]
 fn a_table_in_the_sun_agrees_with_path_tracing() {
     agrees("metal table in the sun", &table_in_the_sun(metal(0.1f32.sqrt())), 2);

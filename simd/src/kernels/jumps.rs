@@ -75,16 +75,12 @@ impl<L: Lanes<Array = [f32; 16]>> Lanes16<L> {
     }
 }
 
-/// Sum of sixteen lanes by repeated halving.
+/// Sum of sixteen lanes by repeated halving. Loops over the halves are compiled to additions in memory.
 #[inline(always)]
 pub(super) fn total<L: Lanes<Array = [f32; 16]>>(lanes: L) -> f32 {
-    let mut values = lanes.to_array();
-    for half in [8, 4, 2, 1] {
-        for i in 0..half {
-            values[i] += values[i + half];
-        }
-    }
-    values[0]
+    let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = lanes.to_array();
+    let four = [(a + i) + (e + m), (b + j) + (f + n), (c + k) + (g + o), (d + l) + (h + p)];
+    (four[0] + four[2]) + (four[1] + four[3])
 }
 
 /// Largest number of strata along a side.

@@ -4,21 +4,19 @@
 //! A lobe gathers light, so that its radiance changes faster than the irradiance: L_o = Σ w_k λ_k has the
 //! gradient Σ w_k ∇λ_k and the Hessian Σ w_k Hess λ_k.
 
-use super::{Derivatives, Hemisphere};
-use crate::cache::radiance::{GatherTables, Weights, zernike::COUNT_MAX};
+use super::Derivatives;
+use crate::Rgb;
+use crate::cache::radiance::{Projection, Weights, zernike::COUNT_MAX};
 use crate::light::luminance;
-use crate::{Level, Rgb};
 
 /// Radiance in place of irradiance. `base` is the radiance of the base, in proportion to the irradiance of
-/// these derivatives. `None` for another number of strata than that of the tables, or without Hessians.
+/// these derivatives. `None` in a basis without Hessians.
 pub(crate) fn leaving_light(
-    level: Level,
-    tables: &GatherTables,
-    hemisphere: &Hemisphere,
+    light: &Projection,
     weights: &[Weights; 3],
     (base, irradiance): (Rgb, &Derivatives),
 ) -> Option<Derivatives> {
-    let (light, change) = tables.change(level, hemisphere)?;
+    let (light, change) = light.change()?;
     let of_channel = weights.each_ref().map(Weights::all);
     let radiance = |channel: usize| {
         let products =
@@ -42,8 +40,9 @@ pub(crate) fn leaving_light(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Level;
     use crate::cache::irradiance::CellFlux;
-    use crate::cache::radiance::{Basis, Representation, Sky};
+    use crate::cache::radiance::{Basis, GatherTables, Representation, Sky};
     use crate::memory::{Arena, Line};
     use core::f32::consts::PI;
     use std::vec;
@@ -64,7 +63,8 @@ mod tests {
         let own = flux.derivatives(level, &hemisphere).unwrap();
         let weights = [Weights::new(&[libm::sqrtf(PI)]); 3];
         let base = own.irradiance * 0.25;
-        let found = leaving_light(level, &tables, &hemisphere, &weights, (base, &own)).unwrap();
+        let light = tables.project(level, &hemisphere).unwrap();
+        let found = leaving_light(&light, &weights, (base, &own)).unwrap();
         let size = own.hessian.xx.abs() + own.hessian.xy.abs() + own.hessian.yy.abs();
         assert!(size > 0.1 && own.gradient[0].length() > 0.1, "{own:?}");
         assert!((found.irradiance / own.irradiance - 1.25).abs().max_element() < 1e-5);

@@ -31,6 +31,7 @@ pub(crate) use served::ServedLobe;
 pub use served::{LobeCensus, LobeSettings, ServedLobes};
 pub use strata::StrataTables;
 pub use tables::GatherTables;
+pub(crate) use tables::Projection;
 
 #[cfg(test)]
 pub(in crate::cache) use rooms::Sky;

@@ -189,9 +189,13 @@ impl PooledRecord {
     }
 }
 
-/// Writes coefficients and gradients, the latter in the unit of length `unit`, above 0, to the registers of
-/// one record. `None` if there are fewer than [`Representation::registers`].
-pub(crate) fn write(out: &mut [[u16; 16]], light: &Expansion, unit: f32) -> Option<PooledRecord> {
+/// Writes coefficients and gradients, the latter times `gradient_scale` and in the unit of length `unit`,
+/// above 0, to the registers of one record. `None` if there are fewer than [`Representation::registers`].
+pub(super) fn write(
+    out: &mut [[u16; 16]],
+    light: &Expansion,
+    (gradient_scale, unit): (f32, f32),
+) -> Option<PooledRecord> {
     let representation = light.representation;
     let [values, slopes] = representation.groups();
     let count = [representation, representation.of_gradients()].map(Representation::count);
@@ -207,7 +211,8 @@ pub(crate) fn write(out: &mut [[u16; 16]], light: &Expansion, unit: f32) -> Opti
         let own = light.values[channel].iter().map(|value| scale * value);
         store(row, own.take(count[0]));
         for (axis, row) in pair.chunks_exact_mut(slopes).enumerate() {
-            let own = light.gradients[channel].iter().map(|slope| scale * unit * slope[axis]);
+            let own =
+                light.gradients[channel].iter().map(|slope| scale * unit * (gradient_scale * slope[axis]));
             store(row, own.take(count[1]));
         }
     }
@@ -237,7 +242,7 @@ impl<'m> CoefficientPool<'m> {
     /// record. `None` without memory.
     pub fn push(&mut self, light: &Expansion, unit: f32) -> Option<PooledRecord> {
         let offset = u32::try_from(self.used).ok()?;
-        let record = write(self.registers.get_mut(self.used..)?, light, unit)?;
+        let record = write(self.registers.get_mut(self.used..)?, light, (1.0, unit))?;
         self.used += record.range().len();
         Some(PooledRecord { offset, ..record })
     }

@@ -4,7 +4,7 @@ use super::basis::{Basis, Representation};
 use super::coefficients::Coefficients;
 use super::derivatives::{CoefficientDerivatives, border_flux};
 use super::pool::{Expansion, PooledRecord, write};
-use super::sh::{self, ShCoefficients, ShTables};
+use super::sh::{self, ShCoefficients, ShGradients, ShTables};
 use super::strata::StrataTables;
 use crate::Level;
 use crate::cache::hemisphere::Hemisphere;
@@ -68,43 +68,51 @@ impl<'m> GatherTables<'m> {
         matches!(self, Self::SphericalHarmonics(_))
     }
 
-    /// Coefficients of the light of `hemisphere` with first and second derivatives. `None` for another number
-    /// of strata, or with spherical harmonics, whose Hessians are unknown.
-    pub(crate) fn change(
-        &self,
-        level: Level,
-        hemisphere: &Hemisphere,
-    ) -> Option<(Coefficients, CoefficientDerivatives)> {
-        let Self::Zernike(tables) = self else { return None };
-        Some((Coefficients::project(level, tables, hemisphere)?, border_flux(level, tables, hemisphere)?))
+    /// Projects the light of `hemisphere`. `None` for another number of strata, or without normals that are
+    /// needed.
+    pub(crate) fn project(&self, level: Level, hemisphere: &Hemisphere) -> Option<Projection> {
+        Some(match self {
+            Self::Zernike(tables) => Projection::Zernike(
+                Coefficients::project(level, tables, hemisphere)?,
+                border_flux(level, tables, hemisphere)?,
+            ),
+            Self::SphericalHarmonics(tables) => Projection::SphericalHarmonics(
+                ShCoefficients::project(level, tables, hemisphere)?,
+                sh::unoccluded(tables, hemisphere)?,
+            ),
+        })
+    }
+}
+
+/// Coefficients of the light of a hemisphere, with derivatives.
+#[expect(clippy::large_enum_variant, reason = "one at a time, on the stack")]
+pub(crate) enum Projection {
+    /// Zernike polynomials.
+    Zernike(Coefficients, CoefficientDerivatives),
+    /// Spherical harmonics, whose Hessians are unknown.
+    SphericalHarmonics(ShCoefficients, ShGradients),
+}
+
+impl Projection {
+    /// Coefficients with first and second derivatives; `None` with spherical harmonics.
+    pub(crate) fn change(&self) -> Option<(&Coefficients, &CoefficientDerivatives)> {
+        match self {
+            Self::Zernike(light, change) => Some((light, change)),
+            Self::SphericalHarmonics(..) => None,
+        }
     }
 
-    /// Projects the light of `hemisphere` and writes its coefficients and their gradients, times
-    /// `gradient_scale`, to the registers of a record whose unit of length is `unit`. `None` for another
-    /// number of strata or registers, or without normals that are needed.
+    /// Writes the coefficients and their gradients, times `gradient_scale`, to the registers of a record
+    /// whose unit of length is `unit`. `None` for another number of registers.
     pub(crate) fn write(
         &self,
-        level: Level,
-        hemisphere: &Hemisphere,
         (gradient_scale, unit): (f32, f32),
         out: &mut [[u16; 16]],
     ) -> Option<PooledRecord> {
-        let scale = |gradients: &mut [[f32; 2]]| {
-            gradients.as_flattened_mut().iter_mut().for_each(|value| *value *= gradient_scale);
+        let expansion = match self {
+            Self::Zernike(light, change) => Expansion::zernike(light, &change.gradients),
+            Self::SphericalHarmonics(light, gradients) => Expansion::spherical_harmonics(light, gradients),
         };
-        match self {
-            Self::Zernike(tables) => {
-                let light = Coefficients::project(level, tables, hemisphere)?;
-                let mut gradients = border_flux(level, tables, hemisphere)?.gradients;
-                scale(gradients.as_flattened_mut());
-                write(out, &Expansion::zernike(&light, &gradients), unit)
-            }
-            Self::SphericalHarmonics(tables) => {
-                let light = ShCoefficients::project(level, tables, hemisphere)?;
-                let mut gradients = sh::unoccluded(tables, hemisphere)?;
-                scale(gradients.as_flattened_mut());
-                write(out, &Expansion::spherical_harmonics(&light, &gradients), unit)
-            }
-        }
+        write(out, &expansion, (gradient_scale, unit))
     }
 }

@@ -157,10 +157,12 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let settings = metric::Settings { least: least_pixels * place.pixel, ..metric.within(picture) };
         let limited = strata.limited().and_then(|h| metric.metric.derivatives(self.context.level, flux, &h));
         let of_radii = limited.as_ref().unwrap_or(&derivatives);
-        let lobe = coefficients
-            .as_ref()
-            .zip(strata.hemisphere())
-            .and_then(|(of, hemisphere)| self.leaving_light(place, (&frame, &hemisphere), of, &derivatives));
+        let edge_moment = strata.hemisphere().map_or(Rgb::ZERO, |hemisphere| hemisphere.edge_moment());
+        let light = coefficients
+            .and_then(|of| Some((of.tables.project(self.context.level, &strata.hemisphere()?)?, of)));
+        let lobe = light.as_ref().and_then(|(light, of)| {
+            self.leaving_light(place, (&frame, of), light, (edge_moment, &derivatives))
+        });
         let reach = match lobe {
             Some(lobe) => validity_with_lobe(&settings, of_radii, &lobe),
             None => validity(&settings, of_radii),
@@ -169,13 +171,11 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let luminance = derivatives.luminance();
         record.set_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
         record.shining = strata.shining as f32 / (n * n) as f32;
-        record.set_edge_moment(strata.hemisphere().map_or(Rgb::ZERO, |hemisphere| hemisphere.edge_moment()));
+        record.set_edge_moment(edge_moment);
         self.find_boundary(&mut record, place, &frame, &strata, counters);
         self.add_overhangs(&mut record, place);
-        let pooled = coefficients.and_then(|of| {
-            let scales = (reach.gradient_scale, record.radii[0]);
-            of.tables.write(self.context.level, &strata.hemisphere()?, scales, of.registers)
-        });
+        let scales = (reach.gradient_scale, record.radii[0]);
+        let pooled = light.and_then(|(light, of)| light.write(scales, of.registers));
         Ok(Some((record, pooled.unwrap_or_default())))
     }
 

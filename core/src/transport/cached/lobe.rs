@@ -3,8 +3,8 @@
 
 use crate::Rgb;
 use crate::bsdf::Features;
-use crate::cache::irradiance::{Derivatives, Hemisphere, leaving_light};
-use crate::cache::radiance::{GatherTables, ServedLobes};
+use crate::cache::irradiance::{Derivatives, leaving_light};
+use crate::cache::radiance::{GatherTables, Projection, ServedLobes};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::transport::cached::gather_point::GatherPoint;
 use crate::transport::path::{LightEstimator, PathIntegrator};
@@ -21,15 +21,15 @@ pub struct CoefficientGathering<'g> {
 }
 
 impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
-    /// Radiance that leaves `place` towards its viewer by lobe and base, with derivatives, from the light of
-    /// a hemisphere with the derivatives `irradiance` in the frame of the point. `None` without a served
-    /// lobe, or in a basis without second derivatives.
+    /// Radiance that leaves `place` towards its viewer by lobe and base, with derivatives, from `light` in the
+    /// frame of the point, its M₅ and the derivatives of its irradiance. `None` without a served lobe, or in
+    /// a basis without second derivatives.
     pub(super) fn leaving_light(
         &self,
         place: &GatherPoint,
-        (frame, hemisphere): (&Frame, &Hemisphere),
-        of: &CoefficientGathering,
-        irradiance: &Derivatives,
+        (frame, of): (&Frame, &CoefficientGathering),
+        light: &Projection,
+        (edge_moment, irradiance): (Rgb, &Derivatives),
     ) -> Option<Derivatives> {
         let (viewer, [u, v]) = (Vec3::from(place.viewer), place.barycentrics);
         let ray = Ray::new(place.position() + viewer, -viewer);
@@ -40,10 +40,10 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let base = match bsdf.has_coated_base() {
             true => {
                 let wo = frame.to_local(viewer);
-                bsdf.base_radiance::<F>(wo, irradiance.irradiance, hemisphere.edge_moment())
+                bsdf.base_radiance::<F>(wo, irradiance.irradiance, edge_moment)
             }
             false => Rgb::ZERO,
         };
-        leaving_light(self.context.level, of.tables, hemisphere, &weights, (base, irradiance))
+        leaving_light(light, &weights, (base, irradiance))
     }
 }

@@ -77,7 +77,8 @@ fn with_records(
     let mut registers = vec![[0; 16]; of.registers()];
     for (record, sky) in records {
         let pooled = sky
-            .map(|sky| tables.write(Level::detect(), &sky.hemisphere(), (0.0, 0.5), &mut registers).unwrap());
+            .map(|sky| tables.project(Level::detect(), &sky.hemisphere()).unwrap())
+            .map(|light| light.write((0.0, 0.5), &mut registers).unwrap());
         let pooled = pooled.as_ref().map(|pooled| (pooled, &*registers));
         assert!(cache.insert_with(*record, pooled));
     }
