@@ -203,9 +203,25 @@ fn scattering_agrees_with_the_reference_on_every_level() {
             certain: random.bits() & random.bits(),
         };
         let (lit, next) = (direct.reference(), scatter.reference());
+        let (reached, samples) = (direct.reach_reference(), scatter.samples_reference());
         shadows += lit.exists.count_ones();
         rays += next.exists.count_ones();
         for level in Level::detect().and_below() {
+            let mut found = ShadowBlock::EMPTY;
+            direct.reach(level, &mut found);
+            assert_eq!(found.exists, reached.exists, "{level:?}");
+            for i in lanes(reached.exists) {
+                assert_eq!(found.rays[i].map(f32::to_bits), lit.rays[i].map(f32::to_bits), "{level:?}");
+                assert_eq!(found.contribution[i], reached.contribution[i], "{level:?}");
+            }
+            let (found, exists) = scatter.samples(level);
+            assert_eq!(exists, samples.1, "{level:?}");
+            for i in lanes(exists) {
+                let of = |block: &ScatterBlock| {
+                    (at(&block.direction, i), at(&block.weight, i), block.pdf[i], block.eta[i])
+                };
+                assert_eq!(of(&found), of(&samples.0), "{level:?}");
+            }
             let mut found = ShadowBlock::EMPTY;
             direct.compute(level, &mut found);
             assert_eq!(found.exists, lit.exists, "{level:?}");
