@@ -76,7 +76,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         }
         block.number(level, lights.has_many_lights());
         block.shadows.exists = 0;
-        let lit = if lights.is_empty() { 0 } else { block.begin_light::<F>(onward) };
+        let lit = if lights.is_empty() { 0 } else { block.begin_light(onward) };
         if lit != 0 {
             block.light(context, lit);
             let Block { points, bsdf, light, value, pdf, each, throughput, shadows, .. } = &mut *block;

@@ -10,6 +10,7 @@ use halflight_simd::kernels::shade::coat::CoatBlock;
 use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
 use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::rough::RoughBlock;
 use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
 use halflight_simd::kernels::shade::sky::SkyBlock;
 use halflight_simd::kernels::shade::specular::SpecularBlock;
@@ -22,6 +23,7 @@ pub(in crate::transport) struct Block<'a> {
     pub(in crate::transport) bsdf: BsdfBlock,
     pub(in crate::transport) coats: CoatBlock,
     pub(in crate::transport) specular: SpecularBlock,
+    pub(in crate::transport) rough: RoughBlock,
     /// Set of coats without a base and without a rough lobe.
     pub(in crate::transport) smooth_coats: u32,
     pub(in crate::transport) samples: SampleBlock,
@@ -81,6 +83,7 @@ impl<'a> Block<'a> {
             bsdf: BsdfBlock::EMPTY,
             coats: CoatBlock::EMPTY,
             specular: SpecularBlock::EMPTY,
+            rough: RoughBlock::EMPTY,
             smooth_coats: 0,
             samples: SampleBlock::EMPTY,
             numbers: VertexNumbers::EMPTY,
@@ -114,7 +117,7 @@ impl<'a> Block<'a> {
     /// Set of the vertices whose BSDFs lanes sample.
     #[inline]
     pub(in crate::transport) fn in_lanes(&self) -> u32 {
-        self.bsdf.diffuse | self.bsdf.metal | self.coats.exists | self.specular.exists
+        self.bsdf.diffuse | self.bsdf.metal | self.coats.exists | self.specular.exists | self.rough.exists
     }
 
     /// Set that has the vertices that are neither diffuse nor rough metals.
@@ -151,6 +154,13 @@ impl<'a> Block<'a> {
                 self.others[i] = *bsdf;
                 return;
             }
+            Bsdf::RoughDielectric(b) if F::DIELECTRIC => {
+                put(&mut self.rough.tint, i, b.tint.to_array());
+                (self.rough.eta[i], self.rough.alpha[i]) = (b.eta, b.alpha);
+                self.rough.exists |= one;
+                self.others[i] = *bsdf;
+                return;
+            }
             Bsdf::Mirror(b) if F::GLOSSY => (b.reflectance, 1.0),
             Bsdf::Conductor(b) if F::GLOSSY => {
                 self.specular.metal |= one;
@@ -174,7 +184,7 @@ impl<'a> Block<'a> {
     /// Removes the BSDFs of all vertices.
     #[inline]
     pub(in crate::transport) fn clear_bsdfs(&mut self) {
-        (self.bsdf.diffuse, self.bsdf.metal) = (0, 0);
+        (self.bsdf.diffuse, self.bsdf.metal, self.rough.exists) = (0, 0, 0);
         (self.coats.exists, self.coats.dielectric, self.smooth_coats) = (0, 0, 0);
         let SpecularBlock { exists, metal, dielectric, .. } = &mut self.specular;
         (*exists, *metal, *dielectric) = (0, 0, 0);
@@ -185,12 +195,13 @@ impl<'a> Block<'a> {
 mod tests {
     use super::*;
     use crate::Level;
-    use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic};
+    use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic, RoughDielectric};
     use crate::sampling::Random;
     use crate::sampling::warp::uniform_sphere;
     use glam::Vec3;
     use halflight_simd::kernels::shade::at;
     use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
+    use halflight_simd::kernels::shade::rough::Rough;
     use halflight_simd::kernels::shade::specular::SpecularSamples;
 
     /// Coats and smooth surfaces of all kinds.
@@ -199,7 +210,12 @@ mod tests {
         let (color, coat) = (Rgb::new(r, g, b), Rgb::new(b, r, g));
         let alpha = if i.is_multiple_of(3) { 0.0 } else { alpha.max(1e-3) };
         let base = if i.is_multiple_of(7) { Rgb::ZERO } else { color };
-        match i % 5 {
+        match i % 6 {
+            5 => Bsdf::RoughDielectric(RoughDielectric {
+                eta: if metallic < 0.5 { 0.4 + 0.5 * eta } else { 1.1 + eta },
+                alpha: alpha.max(1e-3),
+                tint: color,
+            }),
             0 => Bsdf::Glossy(Glossy::new(base, coat, alpha, metallic)),
             1 => Bsdf::Mirror(Mirror { reflectance: color }),
             2 => Bsdf::Conductor(Conductor { f0: color, alpha: 0.0 }),
@@ -232,7 +248,7 @@ mod tests {
                 block.put_bsdf::<All>(i, &all[i], 1);
             }
             block.coats.see(level, &block.points.surface, &COATS);
-            let Block { points, coats, specular, light, numbers, value, pdf, given, .. } = &mut block;
+            let Block { points, coats, specular, rough, light, numbers, value, pdf, given, .. } = &mut block;
             let surface = &points.surface;
             CoatLight { surface, coats, tables: &COATS, direction: &light.direction }
                 .compute(level, value, pdf);
@@ -240,15 +256,19 @@ mod tests {
             let sampled =
                 CoatSamples { surface, coats, tables: &COATS, u, lobe: &lobe }.compute(level, given);
             let smooth = SpecularSamples { surface, specular, lobe: &lobe }.compute(level, given);
+            let rough = Rough { surface, rough };
+            rough.light(level, &light.direction, value, pdf);
+            let refracted = rough.sample(level, (u, &lobe), given);
+            let has_value = coats.exists | rough.rough.exists;
             for (i, bsdf) in all.iter().enumerate() {
                 let bit = |set: u32| set >> i & 1 == 1;
                 let wo = Vec3::from(at(&surface.wo, i));
                 let (f, density) = bsdf.evaluate::<All>(wo, at(&light.direction, i).into());
-                if bit(coats.exists) {
+                if bit(has_value) {
                     assert_eq!((Rgb::from(at(value, i)), pdf[i]), (f, density), "{bsdf:?}");
                 }
                 let sample = bsdf.sample::<All>(wo, [u[0][i], u[1][i], lobe[i]]);
-                let is_sampled = bit(sampled[0] & coats.exists | smooth);
+                let is_sampled = bit(sampled[0] & coats.exists | smooth | refracted);
                 assert_eq!(is_sampled, sample.is_some(), "{bsdf:?}");
                 let Some(sample) = sample else { continue };
                 assert_eq!(bit(sampled[1] | specular.exists), sample.delta, "{bsdf:?}");

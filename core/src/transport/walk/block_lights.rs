@@ -10,21 +10,22 @@ use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::shade::coat::CoatLight;
 use halflight_simd::kernels::shade::emitter::EmitterSamples;
+use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::{at, put};
 
 impl Block<'_> {
     /// Leaves the vertices in `lit` that light samples can reach, and sets the normals for light sampling.
     #[inline]
-    pub(in crate::transport) fn begin_light<F: Features>(&mut self, lit: u32) -> u32 {
+    pub(in crate::transport) fn begin_light(&mut self, lit: u32) -> u32 {
         let mut lit = lit & !(self.specular.exists | self.smooth_coats);
         self.side = self.points.surface.frame[2];
         for i in Set(lit & !self.in_lanes()) {
             if self.others[i].is_delta() {
                 lit &= !(1 << i);
             }
-            if F::DIELECTRIC && self.others[i].transmits() {
-                put(&mut self.side, i, [0.0; 3]);
-            }
+        }
+        for i in Set(lit & self.rough.exists) {
+            put(&mut self.side, i, [0.0; 3]);
         }
         lit
     }
@@ -48,6 +49,10 @@ impl Block<'_> {
                 value,
                 pdf,
             );
+        }
+        if self.rough.exists & self.light.exists != 0 {
+            let Block { points, rough, light, value, pdf, .. } = self;
+            Rough { surface: &points.surface, rough }.light(context.level, &light.direction, value, pdf);
         }
     }
 

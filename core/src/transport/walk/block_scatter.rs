@@ -10,6 +10,7 @@ use crate::transport::wavefront::BLOCK;
 use glam::Vec3;
 use halflight_simd::kernels::shade::coat::CoatSamples;
 use halflight_simd::kernels::shade::numbers::Offsets;
+use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::scatter::Scatter;
 use halflight_simd::kernels::shade::specular::SpecularSamples;
 use halflight_simd::kernels::shade::{Row, at, put};
@@ -64,11 +65,11 @@ impl Block<'_> {
     fn sample_given<F: Features>(&mut self, level: Level, offset: u32, onward: u32, sets: &mut Sets) {
         self.given.eta = [1.0; BLOCK];
         let others = onward & !self.in_lanes();
-        let of_coats = self.coats.exists & onward;
-        if others | of_coats | self.specular.exists & onward == 0 {
+        let lobes = others | (self.coats.exists | self.rough.exists) & onward;
+        if lobes | self.specular.exists & onward == 0 {
             return;
         }
-        let lobe = match others | of_coats | self.specular.dielectric {
+        let lobe = match lobes | self.specular.dielectric {
             0 => [0.0; BLOCK],
             _ => self.samples.singles(level, offset),
         };
@@ -96,16 +97,21 @@ impl Block<'_> {
         sets.transmits |= u32::from(bsdf.transmits()) << i;
     }
 
-    /// Samples the coats and the smooth surfaces among the vertices `onward`.
+    /// Samples the coats, the rough dielectrics and the smooth surfaces among the vertices `onward`.
     #[inline]
     fn sample_lobes(&mut self, level: Level, lobe: &Row, onward: u32, sets: &mut Sets) {
-        let Block { points, coats, specular, numbers, given, .. } = self;
+        let Block { points, coats, specular, rough, numbers, given, .. } = self;
         let surface = &points.surface;
         if coats.exists & onward != 0 {
             let samples = CoatSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
             let [exists, delta] = samples.compute(level, given);
             sets.active &= exists | !coats.exists;
             sets.delta |= delta;
+        }
+        if rough.exists & onward != 0 {
+            let exists = Rough { surface, rough }.sample(level, (&numbers.scatter, lobe), given);
+            sets.active &= exists | !rough.exists;
+            sets.transmits |= rough.exists;
         }
         if specular.exists & onward != 0 {
             let exists = SpecularSamples { surface, specular, lobe }.compute(level, given);

@@ -27,7 +27,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         estimated: &Estimated<'_, 'a>,
         lit: u32,
     ) {
-        let lit = block.begin_light::<F>(lit);
+        let lit = block.begin_light(lit);
         if E::ADDS_NOTHING {
             return self.direct_of((block, memory), wave, estimated, lit);
         }
