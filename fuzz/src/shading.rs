@@ -198,6 +198,18 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         check_records("shadow ray", wanted.exists, &found.rays, &wanted.rays);
         check_records("contribution", wanted.exists, &found.contribution, &wanted.contribution);
 
+        let (mut found, wanted) = (ShadowBlock::EMPTY, direct.reach_reference());
+        direct.reach(level, &mut found);
+        assert_eq!(found.exists, wanted.exists, "{level:?}");
+        check_records("ray to a light", wanted.exists, &found.rays, &wanted.rays);
+        check_records("value", wanted.exists, &found.contribution, &wanted.contribution);
+
+        let ((found, exists), (wanted, set)) = (scatter.samples(level), scatter.samples_reference());
+        assert_eq!(exists, set, "{level:?}");
+        check("sampled direction", set, &found.direction, &wanted.direction);
+        check("sampled weight", set, &found.weight, &wanted.weight);
+        check("sampled density", set, &[found.pdf], &[wanted.pdf]);
+
         let (mut found, wanted) = (NextBlock::EMPTY, scatter.reference());
         scatter.compute(level, &mut found);
         assert_eq!(found.exists, wanted.exists, "{level:?}");

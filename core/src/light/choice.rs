@@ -28,13 +28,13 @@ pub(crate) enum ChosenLight<'m> {
 
 impl ChosenLight<'_> {
     /// Makes an area light without texture the light of vertex `i` (below 16) of a block. Returns its first
-    /// triangle and the probability of the choice; `None` for other lights.
+    /// triangle, the probability of the choice and its number; `None` for other lights.
     #[inline]
-    pub(crate) fn put(&self, block: &mut EmitterBlock, i: usize) -> Option<(u32, f32)> {
+    pub(crate) fn put(&self, block: &mut EmitterBlock, i: usize) -> Option<(u32, f32, u32)> {
         match *self {
-            Self::Emitter { emitter, probability, .. } if !emitter.is_textured() => {
+            Self::Emitter { emitter, probability, light } if !emitter.is_textured() => {
                 emitter.put(block, i);
-                Some((emitter.triangle, probability))
+                Some((emitter.triangle, probability, light))
             }
             _ => None,
         }
@@ -117,6 +117,12 @@ impl<'m> LightSampler<'m> {
         self.environment.is_some_and(|environment| environment.put(block, i, u))
     }
 
+    /// Number of the environment in the order of emission.
+    #[inline]
+    pub(crate) fn environment_number(&self) -> u32 {
+        (self.in_tree() + self.distant.len()) as u32
+    }
+
     /// Samples the environment at the vertices of `active`, into the block of lights. The radiance is still
     /// to be multiplied by that of the environment. Returns the set of samples.
     #[inline]
@@ -164,7 +170,7 @@ impl<'m> LightSampler<'m> {
                     Some(warped) => sampler.sample_at(environment, warped)?,
                     None => sampler.sample(environment, normal, u)?,
                 };
-                let light = (self.in_tree() + self.distant.len()) as u32;
+                let light = self.environment_number();
                 Some((LightSample::far(direction, Rgb::ONE, pdf * probability, light), true))
             }
             ChosenLight::Distant { index, probability } => {

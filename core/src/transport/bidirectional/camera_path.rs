@@ -6,6 +6,7 @@ use crate::geometry::Ray;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::contribution::{Class, Contribution};
+use crate::transport::bidirectional::lanes::Shaded;
 use crate::transport::bidirectional::mis::Sums;
 use crate::transport::walk::history::{History, Rest};
 use crate::transport::walk::visibility::ShadowRays;
@@ -88,6 +89,8 @@ pub(super) struct Vertex<'v> {
     /// The shading normal depends on the camera path: no light path can come here.
     pub(super) is_bent: bool,
     pub(super) sampler: Sampler,
+    /// Its light sample and next ray, where they have been computed in lanes.
+    pub(super) shaded: Option<Shaded<'v>>,
 }
 
 /// The bit of a shadow ray's tag that says that it belongs to a connection.

@@ -15,15 +15,19 @@ use crate::transport::bidirectional::arrival::Arrival;
 use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Recorder, Vertex};
 use crate::transport::bidirectional::contribution::{Class, Contribution};
 use crate::transport::bidirectional::ends::{End, sums_from_camera};
+use crate::transport::bidirectional::lanes::Shaded;
 use crate::transport::bidirectional::merge_photons::Merging;
 use crate::transport::bidirectional::mis::{Counts, Sums};
 use crate::transport::bidirectional::vertex::{LightVertex, is_bent};
 use crate::transport::settings::{Counters, PathSettings};
+use crate::transport::walk::block::Block;
+use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
-use crate::transport::walk::points::{Met, PointBlock};
+use crate::transport::walk::points::Met;
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use crate::transport::walk::visibility::ShadowRays;
+use crate::transport::wavefront::BLOCK;
 use core::ops::Range;
 use glam::Vec3;
 
@@ -233,7 +237,8 @@ impl<'a, F: Features> CameraPaths<'a, F> {
     ) {
         let mut active = count;
         let mut coherence = Coherence::Coherent;
-        let mut points = PointBlock::new();
+        let mut block = Block::new();
+        let has_lanes = self.context.has_lanes();
         while active > 0 {
             counters.rays += active as u64;
             self.context.nearest_batch(&rays[..active], coherence, &mut hits[..active]);
@@ -251,15 +256,26 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             for (index, drawn) in indices[..active * each].iter().zip(&mut *drawn) {
                 *drawn = vertices.get(*index as usize).copied().unwrap_or_default();
             }
-            let mut left = 0;
+            let (mut left, mut sets) = (0, Sets::default());
             queue.count = 0;
             for i in 0..active {
-                let met = self.context.met(&mut points, (&rays[..active], &hits[..active]), i);
+                if i.is_multiple_of(BLOCK) {
+                    let of_block = i..active.min(i + BLOCK);
+                    let traced = (&rays[of_block.clone()], &hits[of_block]);
+                    block.points.meet(&self.context, traced);
+                    if has_lanes {
+                        sets = self.shade(&mut block, (paths, sample), traced.0);
+                    }
+                }
+                let met = block.points.at(i % BLOCK);
+                let shaded = has_lanes.then_some(Shaded { block: &block, sets: &sets, i: i % BLOCK });
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
                 let sampler = sampler_of(path);
                 let drawn = drawn.get(i * each..(i + 1) * each).unwrap_or_default();
-                if let Some(next) = self.step(path, (sampler, drawn), (&ray, &hit, met), queue, counters) {
+                if let Some(next) =
+                    self.step(path, (sampler, drawn), (&ray, &hit, met, shaded), queue, counters)
+                {
                     rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }
@@ -284,7 +300,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         &self,
         path: &mut CameraPath,
         (sampler, drawn): (Sampler, &[LightVertex]),
-        (ray, hit, met): (&Ray, &Hit, Met),
+        (ray, hit, met, shaded): (&Ray, &Hit, Met, Option<Shaded>),
         queue: &mut Queue,
         counters: &mut Counters,
     ) -> Option<Ray> {
@@ -314,18 +330,25 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         if path.segments >= self.settings.max_depth {
             return None;
         }
-        let bsdf = met.bsdf::<F>(self.context.scene);
-        path.history = path.history.on_camera_path(&bsdf);
+        let own;
+        let bsdf = match &shaded {
+            Some(shaded) => shaded.bsdf(),
+            None => {
+                own = met.bsdf::<F>(self.context.scene);
+                &own
+            }
+        };
+        path.history = path.history.on_camera_path(bsdf);
         let wo = point.frame.to_local(-direction);
         let is_bent = is_bent(&point, wo);
-        let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, &bsdf, direction) };
+        let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, bsdf, direction) };
         let is_first_rough = path.has_rough == 0 && !bsdf.is_caustic_caster();
         let eta_vcm = match &self.merging {
-            Some(merging) if is_first_rough && !is_bent => merging.radii.eta_vcm(&bsdf, point.position),
+            Some(merging) if is_first_rough && !is_bent => merging.radii.eta_vcm(bsdf, point.position),
             _ => 0.0,
         };
         let vertex =
-            Vertex { point: &point, bsdf: &bsdf, wo, sums, is_first_rough, eta_vcm, is_bent, sampler };
+            Vertex { point: &point, bsdf, wo, sums, is_first_rough, eta_vcm, is_bent, sampler, shaded };
         let before = path.radiance;
         self.merge(path, &vertex);
         queue.record(Class::Merges, path.history.rest_of_merge(), path, before);

@@ -20,6 +20,7 @@ mod camera_path;
 pub mod camera_paths;
 pub mod contribution;
 pub(in crate::transport) mod ends;
+mod lanes;
 pub mod light_pass;
 pub mod merge_photons;
 mod merging;

@@ -5,6 +5,7 @@ use crate::bsdf::{BsdfSample, Features};
 use crate::geometry::{Hit, Ray};
 use crate::transport::bidirectional::camera_path::{CameraPath, Vertex};
 use crate::transport::bidirectional::camera_paths::CameraPaths;
+use crate::transport::bidirectional::lanes::Next;
 use crate::transport::bidirectional::mis::Sums;
 use crate::transport::bidirectional::vertex::{normal_for_lights, reverse_pdf};
 use crate::transport::settings::Counters;
@@ -22,6 +23,33 @@ impl<F: Features> CameraPaths<'_, F> {
         direction: Vec3,
         counters: &mut Counters,
     ) -> Option<Ray> {
+        let Vertex { point, bsdf, .. } = *vertex;
+        let Next { ray, sample, throughput, eta_squared, is_cut } = match &vertex.shaded {
+            Some(shaded) => shaded.next()?,
+            None => self.next(path, vertex)?,
+        };
+        if is_cut {
+            counters.dropped.unfinished += 1;
+            return None;
+        }
+        path.eta_squared = eta_squared;
+        path.sums = self.leave(vertex, &sample, (direction, ray.direction.into()));
+        path.eta_vcm = if sample.delta { 0.0 } else { vertex.eta_vcm };
+        path.has_rough |= u32::from(!bsdf.is_caustic_caster() && !sample.delta);
+        if sample.delta {
+            path.history = path.history.by_coat();
+        }
+        path.throughput = throughput;
+        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
+        path.position = point.position.to_array();
+        path.normal = normal_for_lights(point, bsdf).to_array();
+        path.triangle = hit.triangle;
+        path.segments += 1;
+        Some(ray)
+    }
+
+    /// The next ray of a path, without lanes.
+    fn next(&self, path: &CameraPath, vertex: &Vertex) -> Option<Next> {
         let Vertex { point, bsdf, wo, sampler, .. } = *vertex;
         let [u, v] = dimension::scattering(&sampler, path.segments);
         let first = dimension::vertex(path.segments);
@@ -32,34 +60,24 @@ impl<F: Features> CameraPaths<'_, F> {
             return None;
         }
         let mut throughput = Rgb::from(path.throughput) * sample.weight;
-        path.eta_squared *= sample.eta * sample.eta;
-        let probability = continuation_probability(path.segments, throughput * path.eta_squared);
+        let eta_squared = path.eta_squared * (sample.eta * sample.eta);
+        let probability = continuation_probability(path.segments, throughput * eta_squared);
         if probability < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= probability {
                 return None;
             }
             throughput /= probability;
         }
-        if is_cut(path.segments, bsdf, &sample) {
-            counters.dropped.unfinished += 1;
-            return None;
-        }
         if throughput == Rgb::ZERO {
             return None;
         }
-        path.sums = self.leave(vertex, &sample, (direction, towards));
-        path.eta_vcm = if sample.delta { 0.0 } else { vertex.eta_vcm };
-        path.has_rough |= u32::from(!bsdf.is_caustic_caster() && !sample.delta);
-        if sample.delta {
-            path.history = path.history.by_coat();
-        }
-        path.throughput = throughput.to_array();
-        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
-        path.position = point.position.to_array();
-        path.normal = normal_for_lights(point, bsdf).to_array();
-        path.triangle = hit.triangle;
-        path.segments += 1;
-        Some(point.spawn(towards))
+        Some(Next {
+            ray: point.spawn(towards),
+            throughput: throughput.to_array(),
+            eta_squared,
+            is_cut: is_cut(path.segments, bsdf, &sample),
+            sample,
+        })
     }
 
     /// Sums after scattering at `vertex`.

@@ -11,6 +11,7 @@ use crate::transport::bidirectional::arrival::Arrival;
 use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Vertex};
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::contribution::Class;
+use crate::transport::bidirectional::lanes::Lit;
 use crate::transport::bidirectional::mis::{
     End, weight_of_connection, weight_of_hit, weight_of_light_sample,
 };
@@ -79,9 +80,33 @@ impl<F: Features> CameraPaths<'_, F> {
     ) -> Option<()> {
         let Self { context, emission, counts, .. } = self;
         let (scene, lights) = (context.scene, context.lights);
-        let Vertex { point, bsdf, wo, sums, sampler, .. } = *vertex;
+        let Vertex { point, bsdf, wo, sums, .. } = *vertex;
+        let Lit { light, value, pdf, ray } = match &vertex.shaded {
+            Some(shaded) => shaded.lit(scene)?,
+            None => self.sample_light(path.segments, vertex)?,
+        };
+        let pdf = if light.delta { 0.0 } else { pdf };
+        let mut emitted = (0.0, 0.0);
+        let mut density = 0.0;
+        if counts.light_paths > 0.0 && path.segments > 1 && !vertex.is_bent {
+            let cos = light.direction.dot(point.geometric_normal).abs();
+            let wi = point.frame.to_local(light.direction);
+            emitted = (cos, reverse_pdf(context, (point, bsdf), wo, wi));
+            density = emission.density_of_sample(scene, lights, &light, point.position);
+        }
+        let weight = weight_of_light_sample(counts, &sums, (pdf, light.pdf), density, emitted);
+        let radiance = Rgb::from(path.throughput) * value * light.radiance * (weight / light.pdf);
+        let rest = path.history.rest_of_sample();
+        queue.push((Class::Paths, rest), tag, ray, radiance);
+        Some(())
+    }
+
+    /// Samples a light at a vertex that ends segment `segments`, without lanes.
+    fn sample_light(&self, segments: u32, vertex: &Vertex) -> Option<Lit> {
+        let (scene, lights) = (self.context.scene, self.context.lights);
+        let Vertex { point, bsdf, wo, sampler, .. } = *vertex;
         let normal = normal_for_lights(point, bsdf);
-        let first = dimension::vertex(path.segments);
+        let first = dimension::vertex(segments);
         let [u, v] = sampler.pair(first + dimension::LIGHT);
         let choice = sampler.single(first + dimension::LIGHT_CHOICE);
         let light = lights.sample(scene, point.position, normal, [u, v, choice])?;
@@ -93,19 +118,7 @@ impl<F: Features> CameraPaths<'_, F> {
         if value == Rgb::ZERO {
             return None;
         }
-        let pdf = if light.delta { 0.0 } else { pdf };
-        let mut emitted = (0.0, 0.0);
-        let mut density = 0.0;
-        if counts.light_paths > 0.0 && path.segments > 1 && !vertex.is_bent {
-            let cos = light.direction.dot(point.geometric_normal).abs();
-            emitted = (cos, reverse_pdf(context, (point, bsdf), wo, wi));
-            density = emission.density_of_sample(scene, lights, &light, point.position);
-        }
-        let weight = weight_of_light_sample(counts, &sums, (pdf, light.pdf), density, emitted);
-        let radiance = Rgb::from(path.throughput) * value * light.radiance * (weight / light.pdf);
-        let rest = path.history.rest_of_sample();
-        queue.push((Class::Paths, rest), tag, shadow_ray(point, &light)?, radiance);
-        Some(())
+        Some(Lit { light, value, pdf, ray: shadow_ray(point, &light)? })
     }
 
     /// Draws the light vertices that the vertex at the end of a path's segment is connected to, one of each

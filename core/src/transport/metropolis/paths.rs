@@ -15,8 +15,10 @@ use crate::sampling::Sampler;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
+use crate::transport::walk::points::{self, PointBlock};
 use crate::transport::walk::termination::{continuation_probability, is_cut};
 use crate::transport::walk::visibility::ShadowRays;
+use crate::transport::wavefront::BLOCK;
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 use glam::{Vec2, Vec3};
@@ -153,6 +155,7 @@ impl<'a, F: Features> Paths<'a, F> {
         counters: &mut Counters,
     ) {
         let mut active = count;
+        let mut points = PointBlock::new();
         let mut coherence = if part == Part::Paths { Coherence::Coherent } else { Coherence::Incoherent };
         while active > 0 {
             counters.rays += active as u64;
@@ -160,10 +163,15 @@ impl<'a, F: Features> Paths<'a, F> {
             coherence = Coherence::Incoherent;
             let mut left = 0;
             for i in 0..active {
+                if i.is_multiple_of(BLOCK) {
+                    let of_block = i..active.min(i + BLOCK);
+                    points.meet(&self.walk.context, (&rays[of_block.clone()], &hits[of_block]));
+                }
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
                 let numbers = numbers(path, ray.tag);
-                if let Some(next) = self.step(path, &numbers, (&ray, &hit), shadows, part, counters) {
+                let end = (&ray, &hit, points.at(i % BLOCK));
+                if let Some(next) = self.step(path, &numbers, end, shadows, part, counters) {
                     rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }
@@ -190,7 +198,7 @@ impl<'a, F: Features> Paths<'a, F> {
         &self,
         path: &mut Path,
         numbers: &impl PathNumbers,
-        (ray, hit): (&Ray, &Hit),
+        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
         shadows: &mut Shadows,
         part: Part,
         counters: &mut Counters,
@@ -198,7 +206,7 @@ impl<'a, F: Features> Paths<'a, F> {
         let direction = Vec3::from(ray.direction);
         let segments = path.subpath.segments;
         let opacity = |n| numbers.opacity(n);
-        let point = match self.walk.meet(&mut path.subpath, (ray, hit), true, opacity, counters) {
+        let point = match self.walk.meet(&mut path.subpath, (ray, hit, met), true, opacity, counters) {
             Met::Surface(point) => point,
             Met::Passed(next) => return Some(next),
             Met::Lost => return None,
@@ -214,7 +222,8 @@ impl<'a, F: Features> Paths<'a, F> {
         if segments >= self.max_depth {
             return None;
         }
-        let vertex = self.walk.camera_vertex(&path.subpath, point, direction, [0.5; 2]);
+        let surface = (point, met.bsdf::<F>(self.walk.context.scene));
+        let vertex = self.walk.camera_vertex(&path.subpath, surface, direction, [0.5; 2]);
         if !vertex.bsdf.is_delta()
             && let Some((shadow, arrives)) =
                 self.walk.light_sample(&path.subpath, &vertex, numbers.light(segments))

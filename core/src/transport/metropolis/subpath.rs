@@ -13,6 +13,7 @@ use crate::transport::bidirectional::vertex::normal_for_lights;
 use crate::transport::bidirectional::vertex::{is_bent, reverse_pdf};
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::points;
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
@@ -157,12 +158,12 @@ impl<'a, F: Features> Walk<'a, F> {
         Some((subpath, emitted.ray))
     }
 
-    /// The end of `ray`, which met `hit`. `opacity` gives the random number of a surface with a
-    /// cut-out after n others.
+    /// The end of `ray`, which `met` a surface at `hit`. `opacity` gives the random number of a surface with
+    /// a cut-out after n others.
     pub(super) fn meet(
         &self,
         subpath: &mut Subpath,
-        (ray, hit): (&Ray, &Hit),
+        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
         at_lens: bool,
         opacity: impl Fn(u32) -> f32,
         counters: &mut Counters,
@@ -170,7 +171,7 @@ impl<'a, F: Features> Walk<'a, F> {
         if !hit.is_some() {
             return Met::Nothing;
         }
-        let Some(point) = self.context.surface_at(ray, hit) else { return Met::Lost };
+        let Some(point) = met.point() else { return Met::Lost };
         // Scattered at or passed before.
         let surfaces = subpath.segments - 1 + subpath.crossings;
         let is_skipped = self.context.is_skipped(&point, hit, subpath.triangle, || opacity(surfaces))
@@ -191,11 +192,10 @@ impl<'a, F: Features> Walk<'a, F> {
     pub(super) fn camera_vertex<'p>(
         &self,
         subpath: &Subpath,
-        point: SurfacePoint<'p>,
+        (point, bsdf): (SurfacePoint<'p>, Bsdf),
         direction: Vec3,
         lens: [f32; 2],
     ) -> Vertex<'p> {
-        let bsdf = self.context.bsdf_at(&point);
         let wo = point.frame.to_local(-direction);
         let is_bent = is_bent(&point, wo);
         let mut vertex = Vertex { point, bsdf, back: -direction, wo, sums: [Sums::default(); 2], is_bent };
@@ -220,10 +220,10 @@ impl<'a, F: Features> Walk<'a, F> {
     pub(super) fn light_vertex<'p>(
         &self,
         subpath: &Subpath,
-        point: SurfacePoint<'p>,
+        surface: (SurfacePoint<'p>, Bsdf),
         direction: Vec3,
     ) -> Option<Vertex<'p>> {
-        let mut vertex = self.light_surface(point, direction)?;
+        let mut vertex = self.light_surface(surface, direction)?;
         let (cos, is_delta) = (vertex.cos(direction), vertex.bsdf.is_delta());
         vertex.sums = match subpath.segments {
             1 => {
@@ -241,9 +241,12 @@ impl<'a, F: Features> Walk<'a, F> {
     }
 
     /// The same without sums.
-    pub(super) fn light_surface<'p>(&self, point: SurfacePoint<'p>, direction: Vec3) -> Option<Vertex<'p>> {
+    pub(super) fn light_surface<'p>(
+        &self,
+        (point, bsdf): (SurfacePoint<'p>, Bsdf),
+        direction: Vec3,
+    ) -> Option<Vertex<'p>> {
         let wo = point.frame.to_local(-direction);
-        let bsdf = self.context.bsdf_at(&point);
         let sums = [Sums::default(); 2];
         (!is_bent(&point, wo)).then_some(Vertex { point, bsdf, back: -direction, wo, sums, is_bent: false })
     }

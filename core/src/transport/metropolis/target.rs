@@ -19,6 +19,8 @@ use crate::light::{EmissionSampler, luminance};
 use crate::sampling::Mutation;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::points::{self, PointBlock};
+use crate::transport::wavefront::BLOCK;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
@@ -195,9 +197,9 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
-        self.advance(lanes, active, counters, |lanes, ray, hit, counters| {
-            let lane = lane(ray.tag as usize);
-            self.light_step(&lane, lanes, (ray, hit), &mut values[lane.number], counters)
+        self.advance(lanes, active, counters, |lanes, end, counters| {
+            let lane = lane(end.0.tag as usize);
+            self.light_step(&lane, lanes, end, &mut values[lane.number], counters)
         });
     }
 
@@ -208,16 +210,22 @@ impl<'a, F: Features> Target<'a, F> {
         lanes: &mut Lanes,
         mut active: usize,
         counters: &mut Counters,
-        mut step: impl FnMut(&mut Lanes, &Ray, &Hit, &mut Counters) -> Option<Ray>,
+        mut step: impl FnMut(&mut Lanes, (&Ray, &Hit, points::Met<'_, 'a>), &mut Counters) -> Option<Ray>,
     ) {
+        let mut points = PointBlock::new();
         while active > 0 {
             counters.rays += active as u64;
             let (rays, hits) = (&lanes.rays[..active], &mut lanes.hits[..active]);
             self.walk.context.nearest_batch(rays, Coherence::Incoherent, hits);
             let mut left = 0;
             for i in 0..active {
+                if i.is_multiple_of(BLOCK) {
+                    let of_block = i..active.min(i + BLOCK);
+                    let traced = (&lanes.rays[of_block.clone()], &lanes.hits[of_block]);
+                    points.meet(&self.walk.context, traced);
+                }
                 let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
-                if let Some(next) = step(lanes, &ray, &hit, counters) {
+                if let Some(next) = step(lanes, (&ray, &hit, points.at(i % BLOCK)), counters) {
                     lanes.rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }
@@ -230,19 +238,23 @@ impl<'a, F: Features> Target<'a, F> {
         &self,
         lane: &Lane,
         lanes: &mut Lanes,
-        (ray, hit): (&Ray, &Hit),
+        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
         value: &mut Value,
         counters: &mut Counters,
     ) -> Option<Ray> {
         let Lane { number, segments, technique, point: numbers } = *lane;
         let subpath = &mut lanes.lights[number];
         let opacity = |n| numbers.opacity(n, true);
-        let point = match self.walk.meet(subpath, (ray, hit), false, opacity, counters) {
+        let point = match self.walk.meet(subpath, (ray, hit, met), false, opacity, counters) {
             Met::Surface(point) => point,
             Met::Passed(next) => return Some(next),
             Met::Nothing | Met::Lost => return None,
         };
-        let vertex = self.walk.light_vertex(subpath, point, ray.direction.into())?;
+        let vertex = self.walk.light_vertex(
+            subpath,
+            (point, met.bsdf::<F>(self.walk.context.scene)),
+            ray.direction.into(),
+        )?;
         if subpath.segments < technique.subpaths(segments)[0] {
             let u = numbers.scattering(subpath.segments, true);
             return self.walk.scatter(subpath, &vertex, true, u).map(|(next, _)| next);
@@ -279,9 +291,9 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
-        self.advance(lanes, active, counters, |lanes, ray, hit, counters| {
-            let lane = lane(ray.tag as usize);
-            self.camera_step(&lane, lanes, (ray, hit), &mut values[lane.number], counters)
+        self.advance(lanes, active, counters, |lanes, end, counters| {
+            let lane = lane(end.0.tag as usize);
+            self.camera_step(&lane, lanes, end, &mut values[lane.number], counters)
         });
     }
 
@@ -289,7 +301,7 @@ impl<'a, F: Features> Target<'a, F> {
         &self,
         lane: &Lane,
         lanes: &mut Lanes,
-        (ray, hit): (&Ray, &Hit),
+        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
         value: &mut Value,
         counters: &mut Counters,
     ) -> Option<Ray> {
@@ -299,7 +311,7 @@ impl<'a, F: Features> Target<'a, F> {
         let opacity = |n| numbers.opacity(n, false);
         let is_last = subpath.segments == technique.subpaths(segments)[1];
         let is_hit = technique == Technique::Hit && is_last;
-        let point = match self.walk.meet(subpath, (ray, hit), true, opacity, counters) {
+        let point = match self.walk.meet(subpath, (ray, hit, met), true, opacity, counters) {
             Met::Surface(point) => point,
             Met::Passed(next) => return Some(next),
             Met::Nothing if is_hit => {
@@ -314,7 +326,8 @@ impl<'a, F: Features> Target<'a, F> {
             value.radiance = self.part(value.pixel, segments, &seen).to_array();
             return None;
         }
-        let vertex = self.walk.camera_vertex(subpath, point, direction, numbers.lens());
+        let surface = (point, met.bsdf::<F>(self.walk.context.scene));
+        let vertex = self.walk.camera_vertex(subpath, surface, direction, numbers.lens());
         if !is_last {
             let u = numbers.scattering(subpath.segments, false);
             return self.walk.scatter(subpath, &vertex, false, u).map(|(next, _)| next);
@@ -342,7 +355,8 @@ impl<'a, F: Features> Target<'a, F> {
         (ray, hit): (&Ray, &Hit),
     ) -> Option<(Ray, Contribution)> {
         let point = self.walk.context.surface_at(ray, hit)?;
-        let other = self.walk.light_surface(point, ray.direction.into())?;
+        let surface = (point, self.walk.context.bsdf_at(&point));
+        let other = self.walk.light_surface(surface, ray.direction.into())?;
         self.walk.connection(camera, (light, &other))
     }
 

@@ -17,7 +17,6 @@
 //! the pixels of its circle, no wave cuts a circle, and samples are summed in order: the picture has the same
 //! bits for any wave size and any distribution of tasks.
 
-mod block;
 mod connection;
 mod direct;
 pub(in crate::transport) mod estimator;
@@ -44,12 +43,12 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::Scene;
 use crate::transport::settings::{Counters, PathSettings};
+use crate::transport::walk::block::Block;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::path_classes::PathClasses;
 use crate::transport::wavefront::{BLOCK, Wavefront};
 use crate::{Level, Rgb};
-use block::Block;
 use core::ops::Range;
 use halflight_simd::kernels::shade::numbers::SampleBlock;
 use shade::Shading;

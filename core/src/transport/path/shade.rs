@@ -3,21 +3,21 @@
 //! roulette.
 
 use super::PathIntegrator;
-use super::block::Block;
 use super::estimator::{EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight};
 use super::sharing::PathMemory;
 use super::sharing::Sharing;
+use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::geometry::{Hit, Ray};
 use crate::light::emitted;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
+use crate::transport::walk::block::Block;
 use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
 use crate::transport::walk::termination::{continuation_probability, is_cut};
 use crate::transport::wavefront::{BLOCK, PathState, Shade, Wavefront};
-use crate::{Level, Rgb};
 use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::Vec3;
@@ -43,8 +43,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_
     }
 
     fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
-        // The baseline gains nothing by lanes, as measured with SSE2.
-        if cfg!(target_arch = "x86_64") && self.integrator.context.level > Level::BASELINE {
+        if self.integrator.context.has_lanes() {
             return self.shade_block(wave, range, counters);
         }
         let Self { integrator, memory, .. } = self;

@@ -61,6 +61,13 @@ impl<'a, F: Features> SceneContext<'a, F> {
         Self { scene, bvh, lights, level, has_cutouts, has_mirrors, features: PhantomData }
     }
 
+    /// True if blocks of vertices are shaded in lanes. The baseline gains nothing by them, as measured with
+    /// SSE2.
+    #[inline]
+    pub(in crate::transport) fn has_lanes(&self) -> bool {
+        cfg!(target_arch = "x86_64") && self.level > Level::BASELINE
+    }
+
     /// Nearest hit of `ray`.
     #[inline]
     pub(in crate::transport) fn nearest(&self, ray: &Ray) -> Hit {

@@ -17,11 +17,13 @@ use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::history::History;
-use crate::transport::walk::points::{Met, PointBlock};
+use crate::transport::walk::light_lanes::Lanes;
 use crate::transport::walk::sums::Sums;
 use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
+use crate::transport::wavefront::BLOCK;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use halflight_simd::kernels::shade::numbers::Offsets;
 
 /// Number of light paths of a task.
 pub const PATHS_PER_TASK: usize = 1024;
@@ -36,9 +38,13 @@ pub(in crate::transport) const MAX_CONTINUATION: f32 = 0.8;
 /// Dimensions of the sampler at a vertex: scattered direction, lobe, Russian roulette, and one for the
 /// visitor.
 const SCATTERING: u32 = 0;
-const LOBE: u32 = 1;
+pub(super) const LOBE: u32 = 1;
 const ROULETTE: u32 = 2;
 const VISITOR: u32 = 3;
+
+/// Offsets for the numbers of blocks of vertices; lights are not sampled.
+pub(super) const OFFSETS: Offsets =
+    Offsets { light: SCATTERING, choice: LOBE, scatter: SCATTERING, roulette: ROULETTE };
 
 /// State of one light subpath between two vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -163,7 +169,7 @@ pub(in crate::transport) struct LightWalk<'a, F> {
     pub max_depth: u32,
 }
 
-impl<F: Features> LightWalk<'_, F> {
+impl<'a, F: Features> LightWalk<'a, F> {
     /// Number of tasks of a map.
     pub(in crate::transport) fn tasks(&self) -> usize {
         (self.paths as usize).div_ceil(PATHS_PER_TASK)
@@ -195,7 +201,7 @@ impl<F: Features> LightWalk<'_, F> {
         let rays = arena.slice::<Ray>(PATHS_PER_TASK)?;
         let hits = arena.slice::<Hit>(PATHS_PER_TASK)?;
         let mut counters = Counters::default();
-        let mut points = PointBlock::new();
+        let (mut lanes, has_lanes) = (Lanes::new(), self.context.has_lanes());
         let mut active = 0;
         for (i, state) in states.iter_mut().enumerate().take(paths) {
             let number = (first + i) as u32;
@@ -222,11 +228,19 @@ impl<F: Features> LightWalk<'_, F> {
             self.context.nearest_batch(&rays[..active], Coherence::Incoherent, &mut hits[..active]);
             let mut going_on = 0;
             for i in 0..active {
-                let met = self.context.met(&mut points, (&rays[..active], &hits[..active]), i);
+                if i.is_multiple_of(BLOCK) {
+                    let of_block = i..active.min(i + BLOCK);
+                    let rays = &rays[of_block.clone()];
+                    lanes.block.points.meet(&self.context, (rays, &hits[of_block]));
+                    if has_lanes {
+                        let place = Sampler::replicate_place(seed, map >> 1, map & 1);
+                        lanes.gather::<F, V>(&self.context, (rays, states), (place, self.max_depth));
+                    }
+                }
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(state) = states.get_mut(ray.tag as usize) else { continue };
                 let numbers = numbers_of(state.number);
-                let met = (&ray, &hit, met);
+                let met = (&ray, &hit, &mut lanes, i % BLOCK);
                 if let Some(next) = self.step(state, &numbers, met, visitor, &mut counters) {
                     rays[going_on] = Ray { tag: ray.tag, ..next };
                     going_on += 1;
@@ -242,10 +256,11 @@ impl<F: Features> LightWalk<'_, F> {
         &self,
         state: &mut LightPathState,
         numbers: &N,
-        (ray, hit, met): (&Ray, &Hit, Met),
+        (ray, hit, lanes, i): (&Ray, &Hit, &mut Lanes<'a>, usize),
         visitor: &mut V,
         counters: &mut Counters,
     ) -> Option<Ray> {
+        let met = lanes.block.points.at(i);
         let point = met.point()?;
         let direction = Vec3::from(ray.direction);
         let opacity = || numbers.single(dimension::opacity(state.segments, state.crossings));
@@ -261,7 +276,8 @@ impl<F: Features> LightWalk<'_, F> {
         if state.segments >= self.max_depth {
             return None;
         }
-        let bsdf = met.bsdf::<F>(self.context.scene);
+        let is_in_lanes = lanes.has(i);
+        let bsdf = if is_in_lanes { lanes.block.others[i & 15] } else { met.bsdf::<F>(self.context.scene) };
         let first = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
         let (barycentric, to_light, opacity) = ([hit.u, hit.v], -direction, self.context.opacity_at(&point));
         let vertex = Vertex { point: &point, bsdf: &bsdf, barycentric, to_light, opacity, numbers, first };
@@ -271,11 +287,22 @@ impl<F: Features> LightWalk<'_, F> {
         }
 
         let from = point.frame.to_local(-direction);
-        let [u, v] = numbers.pair(first + SCATTERING);
-        let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
-        let sample = match F::GLOSSY && visitor.is_apart(state, &vertex) {
-            true => bsdf.sample_apart::<F>(from, [u, v, lobe], 1.0),
-            false => bsdf.sample::<F>(from, [u, v, lobe]).map(|sample| (sample, sample.delta)),
+        // A diffuse surface has no specular lobe.
+        if onward.specular_only && matches!(bsdf, Bsdf::Diffuse(_)) {
+            return None;
+        }
+        let is_apart = F::GLOSSY && visitor.is_apart(state, &vertex);
+        let (sample, roulette) = if is_in_lanes && !is_apart {
+            let (sample, roulette) = lanes.sample::<F>(self.context.level, i);
+            (sample.map(|sample| (sample, sample.delta)), roulette)
+        } else {
+            let [u, v] = numbers.pair(first + SCATTERING);
+            let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
+            let sample = match is_apart {
+                true => bsdf.sample_apart::<F>(from, [u, v, lobe], 1.0),
+                false => bsdf.sample::<F>(from, [u, v, lobe]).map(|sample| (sample, sample.delta)),
+            };
+            (sample, numbers.single(first + ROULETTE))
         };
         let (sample, is_specular) =
             sample.filter(|(_, is_specular)| *is_specular || !onward.specular_only)?;
@@ -299,10 +326,7 @@ impl<F: Features> LightWalk<'_, F> {
         let continuation_probability = (next.max_element() / power.max_element()).min(onward.most);
         let continuation_probability =
             continuation_probability.min(survival_limit(state.segments + 1) / state.survived);
-        if !(continuation_probability > 0.0
-            && numbers.single(first + ROULETTE) < continuation_probability
-            && next.is_finite())
-        {
+        if !(continuation_probability > 0.0 && roulette < continuation_probability && next.is_finite()) {
             return None;
         }
         if is_cut(state.segments, &bsdf, &sample) {

@@ -26,8 +26,8 @@ pub(in crate::transport) struct PointBlock<'a> {
     /// Set of hits whose colours were looked up in lanes, and their texels.
     textured: u32,
     texel: Row3,
-    /// Set of hits with a point, by [`SceneContext::met`].
-    met: u32,
+    /// Set of hits with a point, by [`PointBlock::meet`].
+    pub(in crate::transport) met: u32,
 }
 
 static GREY: Material = Material::GREY;
@@ -75,7 +75,11 @@ impl<'a> PointBlock<'a> {
 
     /// Computes the points of the `hits` of `rays`, at most sixteen.
     #[inline]
-    fn meet<F: Features>(&mut self, context: &SceneContext<'a, F>, rays: &[Ray], hits: &[Hit]) {
+    pub(in crate::transport) fn meet<F: Features>(
+        &mut self,
+        context: &SceneContext<'a, F>,
+        (rays, hits): (&[Ray], &[Hit]),
+    ) {
         let mut met = 0;
         for (i, hit) in hits.iter().enumerate() {
             met |= u32::from(hit.is_some() && self.gather(context.scene, i, hit)) << i;
@@ -197,6 +201,12 @@ impl<'a> PointBlock<'a> {
         self.surface.front >> (i & 15) & 1 == 1
     }
 
+    /// Hit `i` of the block.
+    #[inline]
+    pub(in crate::transport) fn at(&self, i: usize) -> Met<'_, 'a> {
+        Met { points: self, i: i & 15 }
+    }
+
     /// BSDF at hit `i`.
     #[inline]
     pub(in crate::transport) fn bsdf<F: Features>(&self, scene: &Scene, i: usize) -> Bsdf {
@@ -251,23 +261,5 @@ impl Set {
             set |= u32::from(is(*value)) << i;
         }
         set
-    }
-}
-
-impl<'a, F: Features> SceneContext<'a, F> {
-    /// Hit `i` of `rays`, for one `i` after the other from 0 on. The first of a block computes the points of
-    /// all, so that the rays up to `i` may be replaced.
-    #[inline]
-    pub(in crate::transport) fn met<'p>(
-        &self,
-        points: &'p mut PointBlock<'a>,
-        (rays, hits): (&[Ray], &[Hit]),
-        i: usize,
-    ) -> Met<'p, 'a> {
-        if i.is_multiple_of(BLOCK) {
-            let end = rays.len().min(i + BLOCK);
-            points.meet(self, &rays[i..end], &hits[i..end]);
-        }
-        Met { points, i: i % BLOCK }
     }
 }

@@ -113,3 +113,9 @@ pub(super) fn frame<F: Load>(from: F, surface: &SurfaceBlock) -> [[F::Lanes; 3];
     let [tangent, bitangent, normal] = &surface.frame;
     [from.row3(tangent), from.row3(bitangent), from.row3(normal)]
 }
+
+/// Local direction of `direction` in the frame of `axes`.
+#[inline(always)]
+pub(super) fn to_local<L: Lanes>([tangent, bitangent, normal]: [[L; 3]; 3], direction: [L; 3]) -> [L; 3] {
+    [dot(direction, tangent), dot(direction, bitangent), dot(direction, normal)]
+}

@@ -6,7 +6,7 @@
 //! S = (1 - c)^5. One of a coat of Schlick reflects metal + (1 - metal) · S. The part of a coat that depends
 //! on the viewer is computed once a vertex.
 
-use super::bsdf::{frame, viewer};
+use super::bsdf::{frame, to_local, viewer};
 use super::coat_tables::{AMPLITUDES, CoatTables, LAST_AMPLITUDE, STEP, TablePlace, lerp, place, unit};
 use super::fresnel::{fresnel, schlick_weight};
 use super::ggx::Ggx;
@@ -271,12 +271,6 @@ pub struct CoatLight<'b> {
     pub tables: &'b CoatTables,
     /// Unit directions to the lights.
     pub direction: &'b Row3,
-}
-
-/// Local direction of `direction` in the frame of `axes`.
-#[inline(always)]
-fn to_local<L: Lanes>([tangent, bitangent, normal]: [[L; 3]; 3], direction: [L; 3]) -> [L; 3] {
-    [dot(direction, tangent), dot(direction, bitangent), dot(direction, normal)]
 }
 
 impl CoatLight<'_> {

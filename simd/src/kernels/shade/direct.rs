@@ -77,7 +77,7 @@ pub struct Direct<'b> {
 pub struct ShadowBlock {
     /// Rays: origin, end, direction, zero. The direction has the length of the ray if the light is bounded.
     pub rays: [[f32; 8]; 16],
-    /// Unoccluded contributions to the pixels, and zero.
+    /// Unoccluded contributions to the pixels, and zero; f |cos| and densities by [`Direct::reach`].
     pub contribution: [[f32; 4]; 16],
     /// Bit `i`: there is a ray.
     pub exists: u32,
@@ -110,16 +110,15 @@ struct ShadowLanes<L: Lanes> {
     exists: L::Mask,
 }
 
-/// Weights light samples against BSDF sampling; given are f |cos| and density of other surfaces, and the
-/// share of each sample.
+/// Shadow rays over lanes, with f |cos| in place of the contributions, and the densities of BSDF sampling;
+/// `given` are both of other surfaces.
 #[inline(always)]
-fn direct<L: Lanes>(
+fn reach<L: Lanes>(
     vertex: &VertexLanes<L>,
     light: &LightLanes<L>,
-    (value, density): ([L; 3], L),
-    each: L,
-) -> ShadowLanes<L> {
-    let (zero, one) = (density.all(0.0), density.all(1.0));
+    given: ([L; 3], L),
+) -> (ShadowLanes<L>, L) {
+    let (zero, (value, density)) = (given.1.all(0.0), given);
     let direction = light.direction;
     let [tangent, bitangent, normal] = vertex.frame;
     let wi = [dot(direction, tangent), dot(direction, bitangent), dot(direction, normal)];
@@ -141,19 +140,33 @@ fn direct<L: Lanes>(
 
     let way = vector::select(light.bounded, sub(light.end, vertex.position), direction);
     let origin = vertex.origin(way);
+    let direction = vector::select(light.bounded, sub(light.end, origin), direction);
+    let end = zero.all(BOUNDED).select(light.bounded, zero.all(f32::INFINITY));
+    (ShadowLanes { origin, end, direction, contribution: value, exists }, density)
+}
+
+/// Weights light samples against BSDF sampling; given are f |cos| and density of other surfaces, and the
+/// share of each sample.
+#[inline(always)]
+fn direct<L: Lanes>(
+    vertex: &VertexLanes<L>,
+    light: &LightLanes<L>,
+    given: ([L; 3], L),
+    each: L,
+) -> ShadowLanes<L> {
+    let (rays, density) = reach(vertex, light, given);
+    let one = density.all(1.0);
     let ratio = each * density / light.pdf;
     let weight = each * (one / (one + ratio.select(light.balance, ratio * ratio)));
     let weight = each.select(light.alone, weight);
-    let contribution = scale(mul(mul(vertex.throughput, value), light.radiance), weight / light.pdf);
-    let direction = vector::select(light.bounded, sub(light.end, origin), direction);
-    let end = zero.all(BOUNDED).select(light.bounded, zero.all(f32::INFINITY));
-    ShadowLanes { origin, end, direction, contribution, exists }
+    let value = mul(mul(vertex.throughput, rays.contribution), light.radiance);
+    ShadowLanes { contribution: scale(value, weight / light.pdf), ..rays }
 }
 
 impl Direct<'_> {
-    /// Shadow rays over lanes.
+    /// Shadow rays over lanes, with their contributions, or with f |cos| and the density if `REACH`.
     #[inline(always)]
-    fn at<F: Load>(&self, from: F) -> ShadowLanes<F::Lanes> {
+    fn at<F: Load, const REACH: bool>(&self, from: F) -> (ShadowLanes<F::Lanes>, F::Lanes) {
         let light = LightLanes {
             direction: from.row3(&self.light.direction),
             end: from.row3(&self.light.end),
@@ -166,41 +179,59 @@ impl Direct<'_> {
             balance: from.set(self.light.balance),
         };
         let vertex = vertices(from, self.surface, self.bsdf, self.throughput);
-        direct(&vertex, &light, (from.row3(self.value), from.row(self.pdf)), from.row(self.each))
+        let (given, each) = ((from.row3(self.value), from.row(self.pdf)), from.row(self.each));
+        match REACH {
+            true => reach(&vertex, &light, given),
+            false => (direct(&vertex, &light, given, each), each.all(0.0)),
+        }
     }
 
     /// Shadow rays by the instructions of `level`, into `block`.
     pub fn compute(&self, level: Level, block: &mut ShadowBlock) {
-        level.dispatch(DirectKernel(self, block));
+        level.dispatch(DirectKernel::<false>(self, block));
+    }
+
+    /// Shadow rays with f |cos| and the densities of BSDF sampling in place of contributions, into `block`:
+    /// for estimators with other weights.
+    pub fn reach(&self, level: Level, block: &mut ShadowBlock) {
+        level.dispatch(DirectKernel::<true>(self, block));
     }
 
     /// Scalar reference; equals [`Direct::compute`] to the bit in lanes that exist.
     pub fn reference(&self) -> ShadowBlock {
+        self.each_lane::<false>()
+    }
+
+    /// Scalar reference; equals [`Direct::reach`] to the bit in lanes that exist.
+    pub fn reach_reference(&self) -> ShadowBlock {
+        self.each_lane::<true>()
+    }
+
+    fn each_lane<const REACH: bool>(&self) -> ShadowBlock {
         let mut block = ShadowBlock::EMPTY;
         for i in 0..super::BLOCK {
-            let ray = self.at(One(i));
+            let (ray, last) = self.at::<_, REACH>(One(i));
             let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
             block.rays[i] = [ox, oy, oz, ray.end, dx, dy, dz, 0.0];
-            block.contribution[i] = [r, g, b, 0.0];
+            block.contribution[i] = [r, g, b, last];
             block.exists |= u32::from(ray.exists) << i;
         }
         block
     }
 }
 
-struct DirectKernel<'k, 'b>(&'k Direct<'b>, &'k mut ShadowBlock);
+struct DirectKernel<'k, 'b, const REACH: bool>(&'k Direct<'b>, &'k mut ShadowBlock);
 
-impl Kernel for DirectKernel<'_, '_> {
+impl<const REACH: bool> Kernel for DirectKernel<'_, '_, REACH> {
     type Out = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let ray = self.0.at(All(simd));
+        let (ray, last) = self.0.at::<_, REACH>(All(simd));
         let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
-        let zero = simd.splat16(0.0);
         let block = self.1;
-        simd.octets16([ox, oy, oz, ray.end, dx, dy, dz, zero], &mut block.rays);
-        block.contribution = simd.records16([r, g, b, zero]);
+        simd.octets16([ox, oy, oz, ray.end, dx, dy, dz, simd.splat16(0.0)], &mut block.rays);
+        block.contribution = simd.records16([r, g, b, last]);
         block.exists = ray.exists.bits();
     }
 }

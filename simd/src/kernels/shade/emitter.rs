@@ -71,6 +71,8 @@ pub struct EmitterSampleBlock {
     pub end: Row3,
     /// Unit directions to the positions.
     pub direction: Row3,
+    /// Distances to the positions.
+    pub distance: Row,
     /// Densities in solid angle, including the choice of the light.
     pub pdf: Row,
     /// Bit `i`: there is a sample.
@@ -97,6 +99,7 @@ pub struct EmitterLanes<L: Lanes> {
 pub struct EmitterSampleLanes<L: Lanes> {
     end: [L; 3],
     direction: [L; 3],
+    distance: L,
     pdf: L,
     exists: L::Mask,
     front: L::Mask,
@@ -165,7 +168,7 @@ pub fn sample<L: Lanes>(
     let error = zero.all(16.0 * f32::EPSILON) * vector::largest(largest);
     let side = vector::select(front, light.normal, vector::negate(light.normal));
     let end = add(position, scale(side, error));
-    EmitterSampleLanes { end, direction, pdf, exists, front, second }
+    EmitterSampleLanes { end, direction, distance, pdf, exists, front, second }
 }
 
 impl EmitterSamples<'_> {
@@ -195,7 +198,7 @@ impl EmitterSamples<'_> {
             let sample = sample(&light, at(self.from, i), at(self.normal, i), u, self.probability[i], active);
             put(&mut block.end, i, sample.end);
             put(&mut block.direction, i, sample.direction);
-            block.pdf[i] = sample.pdf;
+            (block.distance[i], block.pdf[i]) = (sample.distance, sample.pdf);
             block.exists |= u32::from(sample.exists) << i;
             block.front |= u32::from(sample.front) << i;
             block.second |= u32::from(sample.second) << i;
@@ -209,6 +212,7 @@ impl EmitterSampleBlock {
     pub const EMPTY: Self = Self {
         end: [[0.0; 16]; 3],
         direction: [[0.0; 16]; 3],
+        distance: [0.0; 16],
         pdf: [0.0; 16],
         exists: 0,
         front: 0,
@@ -241,6 +245,7 @@ impl Kernel for SampleKernel<'_, '_> {
         EmitterSampleBlock {
             end: vector::to_arrays(sample.end),
             direction: vector::to_arrays(sample.direction),
+            distance: sample.distance.to_array(),
             pdf: sample.pdf.to_array(),
             exists: sample.exists.bits(),
             front: sample.front.bits(),

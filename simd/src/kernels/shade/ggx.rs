@@ -48,19 +48,46 @@ impl<L: Lanes> Ggx<L> {
         (one - self.alpha2) * s2 / (s2 + self.alpha2 * z * z)
     }
 
-    /// Samples the reflection of `wo` at a visible normal. The direction may point below the horizon.
+    /// Samples a normal, not normalised: a point of the cap z > -k z_o of the unit sphere in stretched space,
+    /// plus the stretched viewer.
     #[inline(always)]
-    pub fn sample_reflection(self, wo: [L; 3], u: [L; 2]) -> [L; 3] {
-        let (zero, one, two) = (u[0].all(0.0), u[0].all(1.0), u[0].all(2.0));
+    fn sample_cap(self, wo: [L; 3], u: [L; 2], k: L) -> [L; 3] {
+        let (zero, one) = (u[0].all(0.0), u[0].all(1.0));
         let alpha = self.alpha2.sqrt();
         let viewer = divide([alpha * wo[0], alpha * wo[1], wo[2]], self.stretch(wo));
-        let bound = self.cap_bound(wo) * viewer[2];
+        let bound = k * viewer[2];
         let z = (one - u[1]) * (one + bound) - bound;
         let (sin, cos) = sin_cos_turns(u[0]);
         let r = (one - z * z).max(zero).sqrt();
         let h = add([r * cos, r * sin, z], viewer);
-        let m = [alpha * h[0], alpha * h[1], h[2].max(zero)];
-        sub(scale(m, two * dot(wo, m) / vector::square(m)), wo)
+        [alpha * h[0], alpha * h[1], h[2].max(zero)]
+    }
+
+    /// Samples a visible normal.
+    #[inline(always)]
+    pub fn sample_visible(self, wo: [L; 3], u: [L; 2]) -> [L; 3] {
+        let m = self.sample_cap(wo, u, wo[2].all(1.0));
+        scale(m, wo[2].all(1.0) / vector::length(m))
+    }
+
+    /// Density of [`Ggx::sample_visible`]; `m` of any length, `c` = wo·m / |m|.
+    #[inline(always)]
+    pub fn visible_density(self, wo: [L; 3], m: [L; 3], c: L) -> L {
+        c.all(2.0) * self.density(m) * c.max(c.all(0.0)) / (wo[2] + self.stretch(wo))
+    }
+
+    /// Smith's masking of a direction on either side.
+    #[inline(always)]
+    pub fn masking(self, v: [L; 3]) -> L {
+        let c = v[2].abs();
+        c.all(2.0) * c / (c + self.stretch(v))
+    }
+
+    /// Samples the reflection of `wo` at a visible normal. The direction may point below the horizon.
+    #[inline(always)]
+    pub fn sample_reflection(self, wo: [L; 3], u: [L; 2]) -> [L; 3] {
+        let m = self.sample_cap(wo, u, self.cap_bound(wo));
+        sub(scale(m, u[0].all(2.0) * dot(wo, m) / vector::square(m)), wo)
     }
 
     /// Density of [`Ggx::sample_reflection`] in solid angle of `wi`; `h` = wo + wi.
@@ -72,8 +99,7 @@ impl<L: Lanes> Ggx<L> {
     /// G |cos θ_i| D / (4 cos θ_o cos θ_i) over the density of [`Ggx::sample_reflection`].
     #[inline(always)]
     pub fn reflection_weight(self, wo: [L; 3], wi: [L; 3]) -> L {
-        let (stretch, c) = (self.stretch(wo), wi[2].abs());
-        let masking = c.all(2.0) * c / (c + self.stretch(wi));
-        masking * (self.cap_bound(wo) * wo[2] + stretch) / (wo[2] + stretch)
+        let stretch = self.stretch(wo);
+        self.masking(wi) * (self.cap_bound(wo) * wo[2] + stretch) / (wo[2] + stretch)
     }
 }

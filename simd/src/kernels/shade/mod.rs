@@ -16,6 +16,7 @@ pub mod ggx;
 mod load;
 pub mod numbers;
 pub mod rectangle;
+pub mod rough;
 pub mod scatter;
 mod sequences;
 pub mod sky;

@@ -209,6 +209,11 @@ impl SampleBlock {
         level.dispatch(Lights(self, offsets, out));
     }
 
+    /// The numbers of the vertices for scattering alone, into `out`.
+    pub fn scattering(&self, level: Level, offsets: Offsets, out: &mut VertexNumbers) {
+        level.dispatch(Scattering(self, offsets, out));
+    }
+
     /// Scalar reference; equals [`SampleBlock::vertices`] to the bit.
     pub fn reference(&self, offsets: Offsets, chooses: bool) -> VertexNumbers {
         let mut out = VertexNumbers::EMPTY;
@@ -273,6 +278,20 @@ impl Kernel for Lights<'_> {
     }
 }
 
+struct Scattering<'k>(&'k SampleBlock, Offsets, &'k mut VertexNumbers);
+
+impl Kernel for Scattering<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self(samples, Offsets { scatter, roulette, .. }, out) = self;
+        let sequences = Sequences::new(samples, &samples.dimension);
+        sequences.pairs(scatter, &mut out.scatter);
+        sequences.singles(roulette, &mut out.roulette);
+    }
+}
+
 struct Singles<'k>(&'k SampleBlock, u32);
 
 impl Kernel for Singles<'_> {
@@ -324,6 +343,10 @@ mod tests {
                 let mut lights = VertexNumbers::EMPTY;
                 samples.lights(level, offsets, &mut lights);
                 assert_eq!((lights.light, lights.choice), (wanted.light, wanted.choice), "{level:?}");
+                let mut scattering = VertexNumbers::EMPTY;
+                samples.scattering(level, offsets, &mut scattering);
+                let found_scattering = (scattering.scatter, scattering.roulette);
+                assert_eq!(found_scattering, (wanted.scatter, wanted.roulette), "{level:?}");
                 samples.vertices(level, offsets, true, &mut found);
                 samples.vertices(level, offsets, false, &mut plain);
                 assert_eq!(found, wanted, "{level:?}");

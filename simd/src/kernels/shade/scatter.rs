@@ -117,19 +117,35 @@ struct NextLanes<L: Lanes> {
     exists: L::Mask,
 }
 
-/// Samples BSDFs and plays roulette.
+/// Samples of BSDFs over lanes: local directions, f |cos| / pdf, and densities.
+struct SampleLanes<L: Lanes> {
+    local: [L; 3],
+    weight: [L; 3],
+    pdf: L,
+    exists: L::Mask,
+}
+
+impl<L: Lanes> ScatterLanes<L> {
+    /// The given samples.
+    #[inline(always)]
+    fn samples(&self) -> SampleLanes<L> {
+        SampleLanes { local: self.direction, weight: self.weight, pdf: self.pdf, exists: self.active }
+    }
+}
+
+/// Samples diffuse surfaces and rough metals at `u`; `given` is the sample of the others.
 #[inline(always)]
-fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLanes<L> {
-    let (zero, one) = (given.pdf.all(0.0), given.pdf.all(1.0));
-    let lambert = warp::cosine_hemisphere(given.u);
-    let mut local = vector::select(vertex.diffuse, lambert, given.direction);
+fn sample<L: Lanes>(vertex: &VertexLanes<L>, u: [L; 2], given: SampleLanes<L>) -> SampleLanes<L> {
+    let (zero, active) = (u[0].all(0.0), given.exists);
+    let lambert = warp::cosine_hemisphere(u);
+    let mut local = vector::select(vertex.diffuse, lambert, given.local);
     let mut weight = vector::select(vertex.diffuse, vertex.reflectance, given.weight);
     let mut pdf = (lambert[2] * zero.all(FRAC_1_PI)).select(vertex.diffuse, given.pdf);
-    let mut exists = given.active;
-    let is_metal = vertex.metal & given.active;
+    let mut exists = active;
+    let is_metal = vertex.metal & active;
     if is_metal.any() {
         let (ggx, wo) = (Ggx::new(vertex.alpha), vertex.viewer());
-        let wi = ggx.sample_reflection(wo, given.u);
+        let wi = ggx.sample_reflection(wo, u);
         let h = add(wo, wi);
         let reflectance = schlick(vertex.reflectance, dot(wo, h) / vector::length(h));
         local = vector::select(is_metal, wi, local);
@@ -137,6 +153,14 @@ fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLa
         pdf = ggx.reflection_density(wo, h).select(is_metal, pdf);
         exists = exists & (!is_metal | zero.lt(wi[2]));
     }
+    SampleLanes { local, weight, pdf, exists }
+}
+
+/// Samples BSDFs and plays roulette.
+#[inline(always)]
+fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLanes<L> {
+    let (zero, one) = (given.pdf.all(0.0), given.pdf.all(1.0));
+    let SampleLanes { local, weight, pdf, exists } = sample(vertex, given.u, given.samples());
     let direction = warp::to_world(vertex.frame, local);
     let throughput = mul(vertex.throughput, weight);
     let eta_squared = given.eta_squared * (given.eta * given.eta);
@@ -153,9 +177,9 @@ fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLa
 }
 
 impl Scatter<'_> {
-    /// Next rays over lanes, and their vertices.
+    /// Vertices and inputs over lanes.
     #[inline(always)]
-    fn at<F: Load>(&self, from: F) -> (NextLanes<F::Lanes>, VertexLanes<F::Lanes>) {
+    fn load<F: Load>(&self, from: F) -> (VertexLanes<F::Lanes>, ScatterLanes<F::Lanes>) {
         let given = ScatterLanes {
             direction: from.row3(&self.given.direction),
             weight: from.row3(&self.given.weight),
@@ -169,8 +193,42 @@ impl Scatter<'_> {
             active: from.set(self.active),
             certain: from.set(self.certain),
         };
-        let vertex = vertices(from, self.surface, self.bsdf, self.throughput);
+        (vertices(from, self.surface, self.bsdf, self.throughput), given)
+    }
+
+    /// Next rays over lanes, and their vertices.
+    #[inline(always)]
+    fn at<F: Load>(&self, from: F) -> (NextLanes<F::Lanes>, VertexLanes<F::Lanes>) {
+        let (vertex, given) = self.load(from);
         (scatter(&vertex, &given), vertex)
+    }
+
+    /// Samples over lanes.
+    #[inline(always)]
+    fn sample<F: Load>(&self, from: F) -> SampleLanes<F::Lanes> {
+        let (vertex, given) = self.load(from);
+        sample(&vertex, given.u, given.samples())
+    }
+
+    /// Samples of all BSDFs by the instructions of `level`, without roulette: for walks with other weights.
+    /// Returns the set of samples as well.
+    #[must_use]
+    pub fn samples(&self, level: Level) -> (ScatterBlock, u32) {
+        level.dispatch(SamplesKernel(self))
+    }
+
+    /// Scalar reference; equals [`Scatter::samples`] to the bit in lanes that exist.
+    #[must_use]
+    pub fn samples_reference(&self) -> (ScatterBlock, u32) {
+        let (mut block, mut exists) = (self.given.clone(), 0);
+        for i in 0..super::BLOCK {
+            let sample = self.sample(One(i));
+            put(&mut block.direction, i, sample.local);
+            put(&mut block.weight, i, sample.weight);
+            block.pdf[i] = sample.pdf;
+            exists |= u32::from(sample.exists) << i;
+        }
+        (block, exists)
     }
 
     /// Next rays by the instructions of `level`, into `block`.
@@ -214,5 +272,23 @@ impl Kernel for ScatterKernel<'_, '_> {
         block.normals = simd.records16([nx, ny, nz, zero]);
         block.local = vector::to_arrays(next.local);
         block.exists = next.exists.bits();
+    }
+}
+
+struct SamplesKernel<'k, 'b>(&'k Scatter<'b>);
+
+impl Kernel for SamplesKernel<'_, '_> {
+    type Out = (ScatterBlock, u32);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> (ScatterBlock, u32) {
+        let sample = self.0.sample(All(simd));
+        let block = ScatterBlock {
+            direction: vector::to_arrays(sample.local),
+            weight: vector::to_arrays(sample.weight),
+            pdf: sample.pdf.to_array(),
+            eta: self.0.given.eta,
+        };
+        (block, sample.exists.bits())
     }
 }

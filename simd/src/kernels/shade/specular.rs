@@ -2,7 +2,7 @@
 //! dielectrics with Fresnel reflection and refraction by Snell's law.
 
 use super::bsdf::viewer;
-use super::fresnel::{fresnel, schlick};
+use super::fresnel::{fresnel, reflection_probability, schlick};
 use super::load::{All, Load, One};
 use super::scatter::ScatterBlock;
 use super::surface::SurfaceBlock;
@@ -69,11 +69,7 @@ impl<L: Lanes> SpecularLanes<L> {
         let (mut ratio, mut exists) = (one, one.eq(one));
         if self.dielectric.any() {
             let reflectance = fresnel(c, eta);
-            // Reflection in proportion to the energy of each side.
-            let [r, g, b] = self.color;
-            let transmitted = (one - reflectance) * (r + g + b) * zero.all(1.0 / 3.0);
-            let sum = reflectance + transmitted;
-            let p = (reflectance / sum).select(zero.lt(sum), one);
+            let p = reflection_probability(reflectance, self.color);
             let reflects = lobe.lt(p);
             let refracts = self.dielectric & !reflects;
             let transmittance = (one - reflectance) / ((one - p) * eta * eta);

@@ -7,6 +7,7 @@ use super::coat_tables::CoatTables;
 use super::direct::{Direct, LightBlock, ShadowBlock};
 use super::emitter::{EmitterBlock, EmitterSamples};
 use super::numbers::{mix, unit_float};
+use super::rough::{Rough, RoughBlock};
 use super::scatter::{NextBlock, Scatter, ScatterBlock};
 use super::sky::{SkyBlock, SkySamples};
 use super::specular::{SpecularBlock, SpecularSamples};
@@ -14,6 +15,7 @@ use super::surface::{SurfaceBlock, Surfaces};
 use super::texture::{MAX_SIZE, TextureBlock};
 use super::{Row, Row3, at, put};
 use crate::Level;
+use crate::lanes::dot;
 
 /// Random numbers in [0, 1).
 struct Random(u64);
@@ -203,9 +205,25 @@ fn scattering_agrees_with_the_reference_on_every_level() {
             certain: random.bits() & random.bits(),
         };
         let (lit, next) = (direct.reference(), scatter.reference());
+        let (reached, samples) = (direct.reach_reference(), scatter.samples_reference());
         shadows += lit.exists.count_ones();
         rays += next.exists.count_ones();
         for level in Level::detect().and_below() {
+            let mut found = ShadowBlock::EMPTY;
+            direct.reach(level, &mut found);
+            assert_eq!(found.exists, reached.exists, "{level:?}");
+            for i in lanes(reached.exists) {
+                assert_eq!(found.rays[i].map(f32::to_bits), lit.rays[i].map(f32::to_bits), "{level:?}");
+                assert_eq!(found.contribution[i], reached.contribution[i], "{level:?}");
+            }
+            let (found, exists) = scatter.samples(level);
+            assert_eq!(exists, samples.1, "{level:?}");
+            for i in lanes(exists) {
+                let of = |block: &ScatterBlock| {
+                    (at(&block.direction, i), at(&block.weight, i), block.pdf[i], block.eta[i])
+                };
+                assert_eq!(of(&found), of(&samples.0), "{level:?}");
+            }
             let mut found = ShadowBlock::EMPTY;
             direct.compute(level, &mut found);
             assert_eq!(found.exists, lit.exists, "{level:?}");
@@ -455,4 +473,37 @@ fn camera_rays_agree_with_the_reference_on_every_level() {
             assert_eq!(found, wanted, "{level:?}");
         }
     }
+}
+
+#[test]
+fn rough_dielectrics_agree_with_the_reference_on_every_level() {
+    let mut random = Random(11);
+    let (mut lit, mut sampled) = ([0; 2], 0);
+    for _ in 0..400 {
+        let surface = seen(&mut random);
+        let rough = RoughBlock {
+            tint: [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)],
+            eta: random.row(0.4, 2.5),
+            alpha: random.row(1e-3, 1.0),
+            exists: random.bits() & surface.regular,
+        };
+        let (rough, direction) = (Rough { surface: &surface, rough: &rough }, random.directions());
+        let (value, pdf, before) = (random.vectors(), random.row(0.0, 1.0), given(&mut random));
+        let (u, lobe) = ([random.row(0.0, 1.0), random.row(0.0, 1.0)], random.row(0.0, 1.0));
+        let (mut wanted, mut samples) = ((value, pdf), before.clone());
+        rough.light_reference(&direction, &mut wanted.0, &mut wanted.1);
+        let set = rough.sample_reference((&u, &lobe), &mut samples);
+        for i in lanes(rough.rough.exists).filter(|&i| wanted.1[i] > 0.0) {
+            lit[usize::from(dot(at(&direction, i), at(&surface.frame[2], i)) < 0.0)] += 1;
+        }
+        sampled += set.count_ones();
+        for level in Level::detect().and_below() {
+            let (mut found, mut out) = ((value, pdf), before.clone());
+            rough.light(level, &direction, &mut found.0, &mut found.1);
+            assert_eq!(found, wanted, "{level:?}");
+            assert_eq!(rough.sample(level, (&u, &lobe), &mut out), set, "{level:?}");
+            check_samples(&out, &samples, &before, [set, rough.rough.exists]);
+        }
+    }
+    assert!(lit[0] > 500 && lit[1] > 500 && sampled > 1500, "{lit:?} lit, {sampled} samples");
 }

@@ -6,14 +6,14 @@ use halflight_core::sampling::{mix, unit_float};
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
 use halflight_simd::kernels::shade::choice::{ChoiceBlock, Choices};
-use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
+use halflight_simd::kernels::shade::coat::CoatBlock;
 use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers, pair, place_key, single};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
-use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
+use halflight_simd::kernels::shade::specular::SpecularBlock;
 use halflight_simd::kernels::shade::surface::{SurfaceBlock, Surfaces};
 use halflight_simd::kernels::shade::texture::TextureBlock;
 use halflight_simd::kernels::shade::{Row, Row3, at};
@@ -38,23 +38,27 @@ pub(super) const KERNELS: &[Kernel] = &[
     Kernel { name: "samples of a sky map", run: |blocks, i, level| blocks.0[i].sky(level) },
     Kernel { name: "light on diffuse", run: |blocks, i, level| blocks.0[i].direct(DIFFUSE, level) },
     Kernel { name: "light on rough metal", run: |blocks, i, level| blocks.0[i].direct(METAL, level) },
+    Kernel { name: "values on rough metal", run: |blocks, i, level| blocks.0[i].reach(METAL, level) },
     Kernel { name: "viewers of coats", run: |blocks, i, level| blocks.0[i].see(level) },
     Kernel { name: "light on coats", run: |blocks, i, level| blocks.0[i].light_coats(level) },
     Kernel { name: "samples of coats", run: |blocks, i, level| blocks.0[i].sample_coats(level) },
     Kernel { name: "samples of dielectrics", run: |blocks, i, level| blocks.0[i].refract(level) },
+    Kernel { name: "light on rough glass", run: |blocks, i, level| blocks.0[i].light_rough(level) },
+    Kernel { name: "samples of rough glass", run: |blocks, i, level| blocks.0[i].sample_rough(level) },
     Kernel { name: "numbers of lobes", run: |blocks, i, level| blocks.0[i].lobes(level) },
     Kernel { name: "scattering, diffuse", run: |blocks, i, level| blocks.0[i].scatter(DIFFUSE, level) },
     Kernel { name: "scattering, rough metal", run: |blocks, i, level| blocks.0[i].scatter(METAL, level) },
+    Kernel { name: "samples of rough metal", run: |blocks, i, level| blocks.0[i].sample_metal(level) },
 ];
 
 const DIFFUSE: usize = 0;
 const METAL: usize = 1;
 
-/// Offset of the choice of the lobe.
-const LOBE: u32 = 3;
-
 /// Tables of rough coats; their values do not affect the time.
-static TABLES: CoatTables = [[[-100; 16]; 12]; 11];
+pub(super) static TABLES: CoatTables = [[[-100; 16]; 12]; 11];
+
+/// Offset of the choice of the lobe.
+pub(super) const LOBE: u32 = 3;
 
 const OFFSETS: Offsets = Offsets { light: 0, choice: 1, scatter: 2, roulette: 4 };
 
@@ -67,21 +71,21 @@ impl Blocks {
     }
 }
 
-struct Block {
+pub(super) struct Block {
     corners: [Row3; 3],
     weights: [Row; 2],
     rays: [[f32; 8]; 16],
-    surface: SurfaceBlock,
-    samples: SampleBlock,
-    numbers: VertexNumbers,
+    pub(super) surface: SurfaceBlock,
+    pub(super) samples: SampleBlock,
+    pub(super) numbers: VertexNumbers,
     groups: [[f32; 8]; 16],
     lights: EmitterBlock,
-    light: LightBlock,
+    pub(super) light: LightBlock,
     bsdfs: [BsdfBlock; 2],
-    coats: CoatBlock,
-    glass: SpecularBlock,
+    pub(super) coats: CoatBlock,
+    pub(super) glass: SpecularBlock,
     given: ScatterBlock,
-    ones: Row3,
+    pub(super) ones: Row3,
     raster: [Row; 2],
     textures: TextureBlock,
 }
@@ -294,8 +298,8 @@ impl Block {
         black_box((&direction, &pdf));
     }
 
-    fn direct(&self, bsdf: usize, level: Option<Level>) {
-        let direct = Direct {
+    fn lit(&self, bsdf: usize) -> Direct<'_> {
+        Direct {
             surface: &self.surface,
             bsdf: &self.bsdfs[bsdf],
             light: &self.light,
@@ -303,7 +307,21 @@ impl Block {
             pdf: &self.ones[0],
             each: &self.ones[0],
             throughput: &self.ones,
-        };
+        }
+    }
+
+    fn reach(&self, bsdf: usize, level: Option<Level>) {
+        let direct = self.lit(bsdf);
+        let mut block = ShadowBlock::EMPTY;
+        match level {
+            None => block = direct.reach_reference(),
+            Some(level) => direct.reach(level, &mut block),
+        }
+        black_box(&block);
+    }
+
+    fn direct(&self, bsdf: usize, level: Option<Level>) {
+        let direct = self.lit(bsdf);
         let mut block = ShadowBlock::EMPTY;
         match level {
             None => block = direct.reference(),
@@ -312,63 +330,8 @@ impl Block {
         black_box(&block);
     }
 
-    fn see(&self, level: Option<Level>) {
-        let mut coats = black_box(&self.coats).clone();
-        match level {
-            None => coats.see_reference(&self.surface, &TABLES),
-            Some(level) => coats.see(level, &self.surface, &TABLES),
-        }
-        black_box(&coats);
-    }
-
-    fn light_coats(&self, level: Option<Level>) {
-        let Self { surface, coats, light, .. } = self;
-        let light = CoatLight { surface, coats, tables: &TABLES, direction: &light.direction };
-        let (mut value, mut pdf) = (self.ones, self.ones[0]);
-        match level {
-            None => light.reference(&mut value, &mut pdf),
-            Some(level) => light.compute(level, &mut value, &mut pdf),
-        }
-        black_box((&value, &pdf));
-    }
-
-    fn sample_coats(&self, level: Option<Level>) {
-        let Self { surface, coats, numbers, .. } = self;
-        let (u, lobe) = (&numbers.scatter, &numbers.choice);
-        let samples = CoatSamples { surface, coats, tables: &TABLES, u, lobe };
-        let mut out = ScatterBlock::EMPTY;
-        black_box(match level {
-            None => samples.reference(&mut out),
-            Some(level) => samples.compute(level, &mut out),
-        });
-        black_box(&out);
-    }
-
-    fn refract(&self, level: Option<Level>) {
-        let Self { surface, glass, numbers, .. } = self;
-        let samples = SpecularSamples { surface, specular: glass, lobe: &numbers.choice };
-        let mut out = ScatterBlock::EMPTY;
-        black_box(match level {
-            None => samples.reference(&mut out),
-            Some(level) => samples.compute(level, &mut out),
-        });
-        black_box(&out);
-    }
-
-    fn lobes(&self, level: Option<Level>) {
-        let samples = &self.samples;
-        let lobes: Row = match level {
-            None => core::array::from_fn(|i| {
-                let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());
-                single(key, index, samples.dimension[i] + LOBE)
-            }),
-            Some(level) => samples.singles(level, LOBE),
-        };
-        black_box(&lobes);
-    }
-
-    fn scatter(&self, bsdf: usize, level: Option<Level>) {
-        let scatter = Scatter {
+    fn scattered(&self, bsdf: usize) -> Scatter<'_> {
+        Scatter {
             surface: &self.surface,
             bsdf: &self.bsdfs[bsdf],
             given: &self.given,
@@ -380,7 +343,16 @@ impl Block {
             eta_squared: &self.ones[0],
             active: 0xffff,
             certain: 0,
-        };
+        }
+    }
+
+    fn sample_metal(&self, level: Option<Level>) {
+        let scatter = self.scattered(METAL);
+        black_box(level.map_or_else(|| scatter.samples_reference(), |level| scatter.samples(level)));
+    }
+
+    fn scatter(&self, bsdf: usize, level: Option<Level>) {
+        let scatter = self.scattered(bsdf);
         let mut block = NextBlock::EMPTY;
         match level {
             None => block = scatter.reference(),

@@ -4,6 +4,7 @@
 //! for [`SECONDS`]. Both ways do so [`REPETITIONS`] times in turn; the medians are reported.
 
 mod data;
+mod lobes;
 
 use super::{REPETITIONS, median};
 use core::hint::black_box;

@@ -10,7 +10,6 @@ mod direct;
 mod scatter;
 
 use super::PathIntegrator;
-use super::block::{Block, Stages};
 use super::estimator::{LightEstimator, PathVertex, RemainingLight};
 use super::shade::{Path, Shading};
 use super::sharing::{PathMemory, Sharing};
@@ -19,6 +18,7 @@ use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
+use crate::transport::walk::block::{Block, Stages};
 use crate::transport::walk::dimension;
 use crate::transport::walk::points::Set;
 use crate::transport::wavefront::{BLOCK, Wavefront};
@@ -68,11 +68,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E
         let stages =
             integrator.arrive_in_block((block, memory), wave_at, (&points, hits), &mut estimated, counters);
         if stages.met != 0 {
-            for (first, segments) in block.samples.dimension.iter_mut().zip(block.segments) {
-                *first = dimension::vertex(segments);
-            }
-            let chooses = context.lights.has_many_lights();
-            block.samples.vertices(context.level, dimension::OFFSETS, chooses, &mut block.numbers);
+            block.number(context.level, context.lights.has_many_lights());
             if !context.lights.is_empty() {
                 integrator.direct_in_block((block, memory), wave, &estimated, stages.lit);
             }

@@ -2,35 +2,18 @@
 
 use super::Estimated;
 use crate::Rgb;
-use crate::bsdf::{Bsdf, BsdfSample, COATS, Diffuse, Features};
-use crate::sampling::Sampler;
+use crate::bsdf::{Bsdf, BsdfSample, Diffuse, Features};
 use crate::transport::path::PathIntegrator;
-use crate::transport::path::block::Block;
 use crate::transport::path::estimator::LightEstimator;
 use crate::transport::path::shade::Path;
 use crate::transport::path::sharing::{PathMemory, Sharing};
 use crate::transport::settings::Counters;
-use crate::transport::walk::dimension;
+use crate::transport::walk::block::Block;
+use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::points::Set;
-use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
-use crate::transport::wavefront::{BLOCK, Wavefront};
+use crate::transport::wavefront::Wavefront;
 use bytemuck::Zeroable;
-use halflight_simd::kernels::shade::coat::CoatSamples;
-use halflight_simd::kernels::shade::scatter::Scatter;
-use halflight_simd::kernels::shade::specular::SpecularSamples;
 use halflight_simd::kernels::shade::{at, put};
-
-/// Sets of vertices for [`Scatter`], and for the paths that go on.
-#[derive(Default)]
-struct Sets {
-    active: u32,
-    /// Paths that must survive.
-    certain: u32,
-    /// Paths that are too long.
-    cut: u32,
-    delta: u32,
-    transmits: u32,
-}
 
 impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// Samples the next rays of the paths of `onward`.
@@ -47,136 +30,16 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             return;
         }
         let level = self.context.level;
-        let starts = onward & Set::of(&block.segments, |segments| segments == 1);
-        if starts != 0 {
-            let pairs = block.samples.second_pairs(level, dimension::PIXEL);
-            let [u, v] = &mut block.numbers.scatter;
-            for i in Set(starts) {
-                (u[i], v[i]) = (pairs[0][i], pairs[1][i]);
-            }
-        }
-        let mut sets = Sets { active: onward, ..Sets::default() };
-        let long = onward & Set::of(&block.segments, |segments| segments >= CERTAIN_BELOW);
-        block.most = [1.0; BLOCK];
-        for i in Set(long) {
-            block.most[i] = most_probable(block.segments[i]);
-            sets.cut |= u32::from(block.segments[i] >= MAX_VERTICES) << i;
-        }
-        let others = onward & !block.in_lanes();
-        self.sample_others((block, memory), wave, others, &mut sets);
-        self.sample_coats((block, memory), wave, onward, &mut sets);
+        let mut sets = block.sample_bsdfs::<F>(level, onward);
         if R::IN_CIRCLES {
             self.leave((block, memory), wave, &mut sets);
         }
-        Scatter {
-            surface: &block.points.surface,
-            bsdf: &block.bsdf,
-            given: &block.given,
-            u: &block.numbers.scatter,
-            roulette: &block.numbers.roulette,
-            most: &block.most,
-            throughput: &block.throughput,
-            factor: &block.factor,
-            eta_squared: &block.eta_squared,
-            active: sets.active,
-            certain: sets.certain,
-        }
-        .compute(level, &mut block.next);
+        block.scatter(level, &sets);
         self.go_on((block, memory), wave, estimated, &sets, counters);
-        // Lanes do not change it.
-        if others | block.specular.exists != 0 {
-            block.given.eta = [1.0; BLOCK];
-        }
     }
 
-    /// Samples the BSDFs of the `others`, which lanes do not sample.
-    #[inline]
-    fn sample_others(
-        &self,
-        (block, memory): (&mut Block<'a>, &mut PathMemory<E::State, R>),
-        wave: &mut Wavefront,
-        others: u32,
-        sets: &mut Sets,
-    ) {
-        let mut none = (E::State::zeroed(), R::State::zeroed());
-        for i in Set(others) {
-            let (bsdf, segments) = (&block.others[i], block.segments[i]);
-            let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
-            let Some(Path { path, shared, .. }) = path else { continue };
-            let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
-            let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
-            let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobe];
-            let wo = at(&block.points.surface.wo, i).into();
-            let Some(sample) = bsdf.sample::<F>(wo, u) else {
-                sets.active &= !(1 << i);
-                continue;
-            };
-            R::sample_bsdf(shared, || match sample.delta {
-                true => Rgb::ZERO,
-                false => bsdf.base_part(wo, sample.direction, sample.weight * sample.pdf),
-            });
-            put(&mut block.given.direction, i, sample.direction.to_array());
-            put(&mut block.given.weight, i, sample.weight.to_array());
-            block.given.pdf[i] = if sample.delta { f32::INFINITY } else { sample.pdf };
-            block.given.eta[i] = sample.eta;
-            sets.cut |= u32::from(is_cut(segments, bsdf, &sample)) << i;
-            sets.delta |= u32::from(sample.delta) << i;
-            sets.transmits |= u32::from(bsdf.transmits()) << i;
-        }
-    }
-
-    /// Samples the coats and the smooth surfaces among the vertices `onward`.
-    #[inline]
-    fn sample_coats(
-        &self,
-        (block, memory): (&mut Block<'a>, &mut PathMemory<E::State, R>),
-        wave: &mut Wavefront,
-        onward: u32,
-        sets: &mut Sets,
-    ) {
-        let level = self.context.level;
-        let Block { points, coats, specular, samples, numbers, given, .. } = &mut *block;
-        let surface = &points.surface;
-        let of_coats = coats.exists & onward;
-        if of_coats | specular.exists & onward == 0 {
-            return;
-        }
-        let lobe = match of_coats | specular.dielectric {
-            0 => [0.0; BLOCK],
-            _ => samples.singles(level, dimension::LOBE),
-        };
-        if of_coats != 0 {
-            let samples = CoatSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe: &lobe };
-            let [exists, delta] = samples.compute(level, given);
-            sets.active &= exists | !coats.exists;
-            sets.delta |= delta;
-        }
-        if specular.exists != 0 {
-            let exists = SpecularSamples { surface, specular, lobe: &lobe }.compute(level, given);
-            sets.active &= exists | !specular.exists;
-            sets.delta |= specular.exists;
-            sets.transmits |= specular.dielectric;
-        }
-        if !R::IN_CIRCLES {
-            return;
-        }
-        let mut none = (E::State::zeroed(), R::State::zeroed());
-        for i in Set(sets.active & (block.coats.exists | block.specular.exists)) {
-            let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
-            let Some(Path { shared, .. }) = path else { continue };
-            R::sample_bsdf(shared, || match sets.delta >> i & 1 == 1 {
-                true => Rgb::ZERO,
-                false => {
-                    let f = Rgb::from(at(&block.given.weight, i)) * block.given.pdf[i];
-                    let wi = at(&block.given.direction, i).into();
-                    block.others[i].base_part(at(&block.points.surface.wo, i).into(), wi, f)
-                }
-            });
-        }
-    }
-
-    /// Calls the sharing rule for the paths that leave diffuse surfaces, and sets their factors to the light
-    /// of the pixel.
+    /// Calls the sharing rule for the samples of coats and rare surfaces and for the paths that leave diffuse
+    /// surfaces, and sets their factors to the light of the pixel.
     #[inline]
     fn leave(
         &self,
@@ -188,6 +51,16 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         for i in Set(sets.active) {
             let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
             let Some(Path { shared, .. }) = path else { continue };
+            if block.has_others() >> i & 1 == 1 {
+                R::sample_bsdf(shared, || match sets.delta >> i & 1 == 1 {
+                    true => Rgb::ZERO,
+                    false => {
+                        let f = Rgb::from(at(&block.given.weight, i)) * block.given.pdf[i];
+                        let wi = at(&block.given.direction, i).into();
+                        block.others[i].base_part(at(&block.points.surface.wo, i).into(), wi, f)
+                    }
+                });
+            }
             if block.bsdf.diffuse >> i & 1 == 1 {
                 let reflectance = Rgb::from(at(&block.bsdf.reflectance, i));
                 let throughput = Rgb::from(at(&block.throughput, i)) * reflectance;

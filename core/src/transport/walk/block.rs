@@ -1,17 +1,16 @@
-//! Block of sixteen vertices in structures of arrays: inputs and results of the shading kernels.
+//! Block of sixteen vertices of subpaths in structures of arrays: inputs and results of the shading kernels.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Diffuse, Features};
-use crate::light::LightSample;
 use crate::transport::walk::points::PointBlock;
 use crate::transport::walk::termination::TRAPPED_FROM;
 use crate::transport::wavefront::BLOCK;
-use glam::Vec3;
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::coat::CoatBlock;
 use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
 use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::rough::RoughBlock;
 use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
 use halflight_simd::kernels::shade::sky::SkyBlock;
 use halflight_simd::kernels::shade::specular::SpecularBlock;
@@ -19,65 +18,72 @@ use halflight_simd::kernels::shade::{Row, Row3, put};
 
 /// Inputs and results of the kernels, and parts of the vertices that only loops use. Rows of vertices that a
 /// stage does not use keep old values.
-pub(super) struct Block<'a> {
-    pub(super) points: PointBlock<'a>,
-    pub(super) bsdf: BsdfBlock,
-    pub(super) coats: CoatBlock,
-    pub(super) specular: SpecularBlock,
+pub(in crate::transport) struct Block<'a> {
+    pub(in crate::transport) points: PointBlock<'a>,
+    pub(in crate::transport) bsdf: BsdfBlock,
+    pub(in crate::transport) coats: CoatBlock,
+    pub(in crate::transport) specular: SpecularBlock,
+    pub(in crate::transport) rough: RoughBlock,
     /// Set of coats without a base and without a rough lobe.
-    pub(super) smooth_coats: u32,
-    pub(super) samples: SampleBlock,
-    pub(super) numbers: VertexNumbers,
-    pub(super) emitters: EmitterBlock,
-    pub(super) probability: Row,
-    pub(super) sky: SkyBlock,
-    pub(super) light: LightBlock,
-    pub(super) value: Row3,
-    pub(super) pdf: Row,
-    pub(super) given: ScatterBlock,
-    pub(super) shadows: ShadowBlock,
-    pub(super) next: NextBlock,
-    pub(super) throughput: Row3,
+    pub(in crate::transport) smooth_coats: u32,
+    pub(in crate::transport) samples: SampleBlock,
+    pub(in crate::transport) numbers: VertexNumbers,
+    pub(in crate::transport) emitters: EmitterBlock,
+    pub(in crate::transport) probability: Row,
+    pub(in crate::transport) sky: SkyBlock,
+    pub(in crate::transport) light: LightBlock,
+    pub(in crate::transport) value: Row3,
+    pub(in crate::transport) pdf: Row,
+    pub(in crate::transport) given: ScatterBlock,
+    pub(in crate::transport) shadows: ShadowBlock,
+    pub(in crate::transport) next: NextBlock,
+    pub(in crate::transport) throughput: Row3,
     /// Factors from the light of the paths to that of their pixels.
-    pub(super) factor: Row3,
-    pub(super) eta_squared: Row,
-    pub(super) most: Row,
+    pub(in crate::transport) factor: Row3,
+    pub(in crate::transport) eta_squared: Row,
+    pub(in crate::transport) most: Row,
     /// Numbers of light samples, and one over them.
-    pub(super) light_samples: [u32; BLOCK],
-    pub(super) each: Row,
+    pub(in crate::transport) light_samples: [u32; BLOCK],
+    pub(in crate::transport) each: Row,
     /// Normals for light sampling; zero if the surface transmits.
-    pub(super) side: Row3,
-    pub(super) path: [u32; BLOCK],
-    pub(super) segments: [u32; BLOCK],
-    /// BSDFs that lanes do not sample, and coats.
-    pub(super) others: [Bsdf; BLOCK],
+    pub(in crate::transport) side: Row3,
+    pub(in crate::transport) path: [u32; BLOCK],
+    pub(in crate::transport) segments: [u32; BLOCK],
+    /// BSDFs that lanes do not sample, and coats; all BSDFs on subpaths of bidirectional methods.
+    pub(in crate::transport) others: [Bsdf; BLOCK],
     /// First triangles of the sampled area lights.
-    pub(super) lamp: [u32; BLOCK],
+    pub(in crate::transport) lamp: [u32; BLOCK],
+    /// Numbers of the sampled lights, in the order of emission, and distances to those at finite places.
+    pub(in crate::transport) sampled: [u32; BLOCK],
+    pub(in crate::transport) distance: Row,
+    /// Set of light samples whose radiance is still to be multiplied by that of the environment.
+    pub(in crate::transport) environment: u32,
     /// True if the only light is in `emitters`, at every vertex.
-    pub(super) is_lone: bool,
+    pub(in crate::transport) is_lone: bool,
 }
 
 /// Vertices of a block by the stages that they pass.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Stages {
+pub(in crate::transport) struct Stages {
     /// Those that scatter in lanes.
-    pub(super) met: u32,
+    pub(in crate::transport) met: u32,
     /// Those among `met` that take light samples.
-    pub(super) lit: u32,
+    pub(in crate::transport) lit: u32,
     /// Those among `met` whose paths go on.
-    pub(super) onward: u32,
+    pub(in crate::transport) onward: u32,
     /// Those that are shaded one by one.
-    pub(super) single: u32,
+    pub(in crate::transport) single: u32,
 }
 
 impl<'a> Block<'a> {
     /// Without vertices.
-    pub(super) fn new() -> Self {
+    pub(in crate::transport) fn new() -> Self {
         Self {
             points: PointBlock::new(),
             bsdf: BsdfBlock::EMPTY,
             coats: CoatBlock::EMPTY,
             specular: SpecularBlock::EMPTY,
+            rough: RoughBlock::EMPTY,
             smooth_coats: 0,
             samples: SampleBlock::EMPTY,
             numbers: VertexNumbers::EMPTY,
@@ -101,19 +107,28 @@ impl<'a> Block<'a> {
             segments: [1; BLOCK],
             others: [Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }); BLOCK],
             lamp: [0; BLOCK],
+            sampled: [0; BLOCK],
+            distance: [0.0; BLOCK],
+            environment: 0,
             is_lone: false,
         }
     }
 
     /// Set of the vertices whose BSDFs lanes sample.
     #[inline]
-    pub(super) fn in_lanes(&self) -> u32 {
-        self.bsdf.diffuse | self.bsdf.metal | self.coats.exists | self.specular.exists
+    pub(in crate::transport) fn in_lanes(&self) -> u32 {
+        self.bsdf.diffuse | self.bsdf.metal | self.coats.exists | self.specular.exists | self.rough.exists
+    }
+
+    /// Set that has the vertices that are neither diffuse nor rough metals.
+    #[inline]
+    pub(in crate::transport) fn has_others(&self) -> u32 {
+        !(self.bsdf.diffuse | self.bsdf.metal)
     }
 
     /// Makes `bsdf` that of vertex `i`, which ends segment `segments` of its path.
     #[inline]
-    pub(super) fn put_bsdf<F: Features>(&mut self, i: usize, bsdf: &Bsdf, segments: u32) {
+    pub(in crate::transport) fn put_bsdf<F: Features>(&mut self, i: usize, bsdf: &Bsdf, segments: u32) {
         let one = 1 << i;
         let (color, eta) = match bsdf {
             Bsdf::Diffuse(b) => {
@@ -139,6 +154,13 @@ impl<'a> Block<'a> {
                 self.others[i] = *bsdf;
                 return;
             }
+            Bsdf::RoughDielectric(b) if F::DIELECTRIC => {
+                put(&mut self.rough.tint, i, b.tint.to_array());
+                (self.rough.eta[i], self.rough.alpha[i]) = (b.eta, b.alpha);
+                self.rough.exists |= one;
+                self.others[i] = *bsdf;
+                return;
+            }
             Bsdf::Mirror(b) if F::GLOSSY => (b.reflectance, 1.0),
             Bsdf::Conductor(b) if F::GLOSSY => {
                 self.specular.metal |= one;
@@ -161,42 +183,25 @@ impl<'a> Block<'a> {
 
     /// Removes the BSDFs of all vertices.
     #[inline]
-    pub(super) fn clear_bsdfs(&mut self) {
-        (self.bsdf.diffuse, self.bsdf.metal) = (0, 0);
+    pub(in crate::transport) fn clear_bsdfs(&mut self) {
+        (self.bsdf.diffuse, self.bsdf.metal, self.rough.exists) = (0, 0, 0);
         (self.coats.exists, self.coats.dielectric, self.smooth_coats) = (0, 0, 0);
         let SpecularBlock { exists, metal, dielectric, .. } = &mut self.specular;
         (*exists, *metal, *dielectric) = (0, 0, 0);
     }
 }
 
-/// Stores a light sample of the vertex `i` at `position`.
-pub(super) fn put_light(light: &mut LightBlock, i: usize, sample: &LightSample, position: Vec3) {
-    let LightSample { direction, distance, target, radiance, pdf, delta, .. } = *sample;
-    put(&mut light.direction, i, direction.to_array());
-    put(&mut light.radiance, i, radiance.to_array());
-    light.pdf[i & 15] = pdf;
-    let end = match target {
-        // Offset from the light's surface, to the side of the vertex.
-        Some(target) => Some(target.position + target.error * target.normal),
-        None if distance < f32::INFINITY => Some(position + distance * direction),
-        None => None,
-    };
-    put(&mut light.end, i, end.unwrap_or(position).to_array());
-    light.exists |= 1 << i;
-    light.bounded |= u32::from(end.is_some()) << i;
-    light.area |= u32::from(target.is_some()) << i;
-    light.alone |= u32::from(delta) << i;
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Level;
-    use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic};
+    use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic, RoughDielectric};
     use crate::sampling::Random;
     use crate::sampling::warp::uniform_sphere;
+    use glam::Vec3;
     use halflight_simd::kernels::shade::at;
     use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
+    use halflight_simd::kernels::shade::rough::Rough;
     use halflight_simd::kernels::shade::specular::SpecularSamples;
 
     /// Coats and smooth surfaces of all kinds.
@@ -205,7 +210,12 @@ mod tests {
         let (color, coat) = (Rgb::new(r, g, b), Rgb::new(b, r, g));
         let alpha = if i.is_multiple_of(3) { 0.0 } else { alpha.max(1e-3) };
         let base = if i.is_multiple_of(7) { Rgb::ZERO } else { color };
-        match i % 5 {
+        match i % 6 {
+            5 => Bsdf::RoughDielectric(RoughDielectric {
+                eta: if metallic < 0.5 { 0.4 + 0.5 * eta } else { 1.1 + eta },
+                alpha: alpha.max(1e-3),
+                tint: color,
+            }),
             0 => Bsdf::Glossy(Glossy::new(base, coat, alpha, metallic)),
             1 => Bsdf::Mirror(Mirror { reflectance: color }),
             2 => Bsdf::Conductor(Conductor { f0: color, alpha: 0.0 }),
@@ -238,7 +248,7 @@ mod tests {
                 block.put_bsdf::<All>(i, &all[i], 1);
             }
             block.coats.see(level, &block.points.surface, &COATS);
-            let Block { points, coats, specular, light, numbers, value, pdf, given, .. } = &mut block;
+            let Block { points, coats, specular, rough, light, numbers, value, pdf, given, .. } = &mut block;
             let surface = &points.surface;
             CoatLight { surface, coats, tables: &COATS, direction: &light.direction }
                 .compute(level, value, pdf);
@@ -246,15 +256,19 @@ mod tests {
             let sampled =
                 CoatSamples { surface, coats, tables: &COATS, u, lobe: &lobe }.compute(level, given);
             let smooth = SpecularSamples { surface, specular, lobe: &lobe }.compute(level, given);
+            let rough = Rough { surface, rough };
+            rough.light(level, &light.direction, value, pdf);
+            let refracted = rough.sample(level, (u, &lobe), given);
+            let has_value = coats.exists | rough.rough.exists;
             for (i, bsdf) in all.iter().enumerate() {
                 let bit = |set: u32| set >> i & 1 == 1;
                 let wo = Vec3::from(at(&surface.wo, i));
                 let (f, density) = bsdf.evaluate::<All>(wo, at(&light.direction, i).into());
-                if bit(coats.exists) {
+                if bit(has_value) {
                     assert_eq!((Rgb::from(at(value, i)), pdf[i]), (f, density), "{bsdf:?}");
                 }
                 let sample = bsdf.sample::<All>(wo, [u[0][i], u[1][i], lobe[i]]);
-                let is_sampled = bit(sampled[0] & coats.exists | smooth);
+                let is_sampled = bit(sampled[0] & coats.exists | smooth | refracted);
                 assert_eq!(is_sampled, sample.is_some(), "{bsdf:?}");
                 let Some(sample) = sample else { continue };
                 assert_eq!(bit(sampled[1] | specular.exists), sample.delta, "{bsdf:?}");
