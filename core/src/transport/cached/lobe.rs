@@ -21,9 +21,9 @@ pub struct CoefficientGathering<'g> {
 }
 
 impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
-    /// Radiance that leaves `place` towards its viewer by lobe and base, with derivatives, from `light` in the
-    /// frame of the point, its M₅ and the derivatives of its irradiance. `None` without a served lobe, or in
-    /// a basis without second derivatives.
+    /// Radiance that leaves `place` towards its viewer by lobe and base, with derivatives, from `light` in
+    /// the frame of the point, its M₅ and the derivatives of its irradiance. `None` without a served lobe,
+    /// or in a basis without second derivatives.
     pub(super) fn leaving_light(
         &self,
         place: &GatherPoint,
