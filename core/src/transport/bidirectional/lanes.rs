@@ -1,45 +1,16 @@
 //! Camera paths of a block in lanes: their light samples and next rays, before their vertices are visited one
 //! by one.
 
-use crate::Rgb;
-use crate::bsdf::{Bsdf, BsdfSample, COATS, Features};
+use crate::bsdf::{COATS, Features};
 use crate::geometry::Ray;
-use crate::light::LightSample;
 use crate::sampling::Sampler;
-use crate::scene::Scene;
 use crate::transport::bidirectional::camera_path::CameraPath;
 use crate::transport::bidirectional::camera_paths::CameraPaths;
 use crate::transport::walk::block::Block;
 use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::points::Set;
-use glam::Vec3;
 use halflight_simd::kernels::shade::direct::Direct;
-use halflight_simd::kernels::shade::{at, put};
-
-/// A vertex of a block, with its light sample and next ray.
-#[derive(Clone, Copy)]
-pub(super) struct Shaded<'s> {
-    pub(super) block: &'s Block<'s>,
-    pub(super) sets: &'s Sets,
-    pub(super) i: usize,
-}
-
-/// A light sample, with f |cos| of its direction and the density of BSDF sampling there.
-pub(super) struct Lit {
-    pub(super) light: LightSample,
-    pub(super) value: Rgb,
-    pub(super) pdf: f32,
-    pub(super) ray: Ray,
-}
-
-/// The next ray of a path.
-pub(super) struct Next {
-    pub(super) ray: Ray,
-    pub(super) sample: BsdfSample,
-    pub(super) throughput: [f32; 3],
-    pub(super) eta_squared: f32,
-    pub(super) is_cut: bool,
-}
+use halflight_simd::kernels::shade::put;
 
 impl<'a, F: Features> CameraPaths<'a, F> {
     /// Light samples and next rays of the paths of `rays`, at most sixteen, whose points are in `block`.
@@ -86,67 +57,5 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let sets = block.sample_bsdfs::<F>(level, onward);
         block.scatter(level, &sets);
         sets
-    }
-}
-
-impl<'s> Shaded<'s> {
-    /// BSDF at the vertex.
-    pub(super) fn bsdf(&self) -> &'s Bsdf {
-        &self.block.others[self.i & 15]
-    }
-
-    fn is_in(&self, set: u32) -> bool {
-        set >> (self.i & 15) & 1 == 1
-    }
-
-    /// The light sample of the vertex, with its radiance in `scene`.
-    pub(super) fn lit(&self, scene: &Scene) -> Option<Lit> {
-        let Self { block, i, .. } = *self;
-        let (light, i) = (&block.light, i & 15);
-        let [r, g, b, pdf] = block.shadows.contribution[i];
-        if !self.is_in(block.shadows.exists) {
-            return None;
-        }
-        let direction = Vec3::from(at(&light.direction, i));
-        let environment = scene.environment.as_ref().filter(|_| self.is_in(block.environment));
-        let factor = environment.map_or(Rgb::ONE, |e| e.radiance(scene, direction));
-        let radiance = Rgb::from(at(&light.radiance, i)) * factor;
-        Some(Lit {
-            light: LightSample {
-                direction,
-                distance: block.distance[i],
-                target: None,
-                radiance,
-                pdf: light.pdf[i],
-                delta: self.is_in(light.alone),
-                light: block.sampled[i],
-            },
-            value: Rgb::new(r, g, b),
-            pdf,
-            ray: bytemuck::cast(block.shadows.rays[i]),
-        })
-    }
-
-    /// The next ray; `None` if the path ends.
-    pub(super) fn next(&self) -> Option<Next> {
-        let Self { block, sets, i } = *self;
-        let (next, i) = (&block.next, i & 15);
-        let [r, g, b, pdf, .., eta_squared] = next.states[i];
-        let delta = self.is_in(sets.delta);
-        let direction = Vec3::from(at(&next.local, i));
-        self.is_in(next.exists).then(|| Next {
-            ray: bytemuck::cast(next.rays[i]),
-            sample: BsdfSample {
-                direction,
-                weight: Rgb::ONE,
-                pdf,
-                delta,
-                transmitted: direction.z < 0.0,
-                eta: block.given.eta[i],
-            },
-            throughput: [r, g, b],
-            eta_squared,
-            is_cut: self.is_in(sets.cut),
-        })
     }
 }

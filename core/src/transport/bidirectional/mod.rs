@@ -27,5 +27,6 @@ mod merging;
 pub mod mis;
 pub mod reference;
 mod scattering;
+mod shaded;
 mod techniques;
 pub mod vertex;

@@ -11,10 +11,10 @@ use crate::transport::bidirectional::arrival::Arrival;
 use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Vertex};
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::contribution::Class;
-use crate::transport::bidirectional::lanes::Lit;
 use crate::transport::bidirectional::mis::{
     End, weight_of_connection, weight_of_hit, weight_of_light_sample,
 };
+use crate::transport::bidirectional::shaded::Lit;
 use crate::transport::bidirectional::vertex::normal_for_lights;
 use crate::transport::bidirectional::vertex::{
     LightVertex, Scattering, reverse_pdf, scattering, scattering_from_light,

@@ -4,7 +4,6 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, Diffuse, Features};
 use crate::transport::walk::points::PointBlock;
 use crate::transport::walk::termination::TRAPPED_FROM;
-use crate::transport::wavefront::BLOCK;
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::coat::CoatBlock;
 use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
@@ -14,7 +13,7 @@ use halflight_simd::kernels::shade::rough::RoughBlock;
 use halflight_simd::kernels::shade::scatter::{NextBlock, ScatterBlock};
 use halflight_simd::kernels::shade::sky::SkyBlock;
 use halflight_simd::kernels::shade::specular::SpecularBlock;
-use halflight_simd::kernels::shade::{Row, Row3, put};
+use halflight_simd::kernels::shade::{BLOCK, Row, Row3, put};
 
 /// Inputs and results of the kernels, and parts of the vertices that only loops use. Rows of vertices that a
 /// stage does not use keep old values.

@@ -6,12 +6,11 @@ use crate::light::{ChosenLight, LightSample, emitted};
 use crate::transport::walk::block::Block;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::points::Set;
-use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::shade::coat::CoatLight;
 use halflight_simd::kernels::shade::emitter::EmitterSamples;
 use halflight_simd::kernels::shade::rough::Rough;
-use halflight_simd::kernels::shade::{at, put};
+use halflight_simd::kernels::shade::{BLOCK, at, put};
 
 impl Block<'_> {
     /// Leaves the vertices in `lit` that light samples can reach, and sets the normals for light sampling.
@@ -30,8 +29,8 @@ impl Block<'_> {
         lit
     }
 
-    /// Samples lights at the vertices in `lit`, which [`Block::begin_light`] has left, and evaluates the BSDFs
-    /// that lanes of shadow rays do not.
+    /// Samples lights at the vertices in `lit`, which [`Block::begin_light`] has left, and evaluates the
+    /// BSDFs that lanes of shadow rays do not.
     #[inline]
     pub(in crate::transport) fn light<F: Features>(&mut self, context: &SceneContext<F>, lit: u32) {
         self.sample_lights(context, lit);

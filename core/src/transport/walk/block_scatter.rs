@@ -6,14 +6,13 @@ use crate::transport::walk::block::Block;
 use crate::transport::walk::dimension;
 use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
-use crate::transport::wavefront::BLOCK;
 use glam::Vec3;
 use halflight_simd::kernels::shade::coat::CoatSamples;
 use halflight_simd::kernels::shade::numbers::Offsets;
 use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::scatter::Scatter;
 use halflight_simd::kernels::shade::specular::SpecularSamples;
-use halflight_simd::kernels::shade::{Row, at, put};
+use halflight_simd::kernels::shade::{BLOCK, Row, at, put};
 
 /// Sets of vertices for [`Scatter`], and for the paths that go on.
 #[derive(Default)]

@@ -17,13 +17,12 @@ use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::history::History;
-use crate::transport::walk::light_lanes::Lanes;
+use crate::transport::walk::light_lanes::{LOBE, Lanes, ROULETTE, SCATTERING};
 use crate::transport::walk::sums::Sums;
 use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
-use crate::transport::wavefront::BLOCK;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use halflight_simd::kernels::shade::numbers::Offsets;
+use halflight_simd::kernels::shade::BLOCK;
 
 /// Number of light paths of a task.
 pub const PATHS_PER_TASK: usize = 1024;
@@ -35,16 +34,8 @@ pub const VERTICES_PER_TASK: usize = 6 * PATHS_PER_TASK;
 /// Maximum continuation probability of a path that stores its vertices.
 pub(in crate::transport) const MAX_CONTINUATION: f32 = 0.8;
 
-/// Dimensions of the sampler at a vertex: scattered direction, lobe, Russian roulette, and one for the
-/// visitor.
-const SCATTERING: u32 = 0;
-pub(super) const LOBE: u32 = 1;
-const ROULETTE: u32 = 2;
+/// Dimension of the sampler at a vertex for the visitor.
 const VISITOR: u32 = 3;
-
-/// Offsets for the numbers of blocks of vertices; lights are not sampled.
-pub(super) const OFFSETS: Offsets =
-    Offsets { light: SCATTERING, choice: LOBE, scatter: SCATTERING, roulette: ROULETTE };
 
 /// State of one light subpath between two vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -234,7 +225,9 @@ impl<'a, F: Features> LightWalk<'a, F> {
                     lanes.block.points.meet(&self.context, (rays, &hits[of_block]));
                     if has_lanes {
                         let place = Sampler::replicate_place(seed, map >> 1, map & 1);
-                        lanes.gather::<F, V>(&self.context, (rays, states), (place, self.max_depth));
+                        let of_tag = |tag: u32| states.get(tag as usize).map(|s| (s.number, s.segments));
+                        let limits = (place, V::DIMENSIONS, self.max_depth);
+                        lanes.gather(&self.context, (rays, of_tag), limits);
                     }
                 }
                 let (ray, hit) = (rays[i], hits[i]);
@@ -249,6 +242,23 @@ impl<'a, F: Features> LightWalk<'a, F> {
             active = going_on;
         }
         Ok(counters)
+    }
+
+    /// A sample of `bsdf` without lanes, of the base or the coat alone if it `is_apart`, and the number of
+    /// roulette. The flag marks a delta function or a coat alone.
+    fn sample<N: Numbers>(
+        numbers: &N,
+        first: u32,
+        (bsdf, from): (&Bsdf, Vec3),
+        is_apart: bool,
+    ) -> (Option<(BsdfSample, bool)>, f32) {
+        let [u, v] = numbers.pair(first + SCATTERING);
+        let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
+        let sample = match is_apart {
+            true => bsdf.sample_apart::<F>(from, [u, v, lobe], 1.0),
+            false => bsdf.sample::<F>(from, [u, v, lobe]).map(|sample| (sample, sample.delta)),
+        };
+        (sample, numbers.single(first + ROULETTE))
     }
 
     /// One vertex at `hit` of `ray`; returns the next ray.
@@ -296,13 +306,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
             let (sample, roulette) = lanes.sample::<F>(self.context.level, i);
             (sample.map(|sample| (sample, sample.delta)), roulette)
         } else {
-            let [u, v] = numbers.pair(first + SCATTERING);
-            let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
-            let sample = match is_apart {
-                true => bsdf.sample_apart::<F>(from, [u, v, lobe], 1.0),
-                false => bsdf.sample::<F>(from, [u, v, lobe]).map(|sample| (sample, sample.delta)),
-            };
-            (sample, numbers.single(first + ROULETTE))
+            Self::sample(numbers, first, (&bsdf, from), is_apart)
         };
         let (sample, is_specular) =
             sample.filter(|(_, is_specular)| *is_specular || !onward.specular_only)?;
@@ -311,17 +315,11 @@ impl<'a, F: Features> LightWalk<'a, F> {
             return None;
         }
         visitor.leave(state, &vertex, from, (&sample, is_specular));
-        // Unlike radiance, power is not scaled by refraction; with a shading normal, the other cosine counts
-        // (Veach 1997, sections 5.2 and 5.3).
         let power = Rgb::from(state.power);
         if power.max_element() <= 0.0 {
             return None;
         }
-        let mut next = power * sample.weight * (sample.eta * sample.eta);
-        if point.frame.normal != point.geometric_normal {
-            let flat = |way: Vec3| way.dot(point.geometric_normal).abs();
-            next *= from.z * flat(towards) / (flat(direction) * sample.direction.z.abs());
-        }
+        let next = scattered(power, &point, (direction, from), (towards, &sample));
         // Paths keep their power where possible: absorption ends paths instead.
         let continuation_probability = (next.max_element() / power.max_element()).min(onward.most);
         let continuation_probability =
@@ -339,6 +337,23 @@ impl<'a, F: Features> LightWalk<'a, F> {
         state.survived *= continuation_probability;
         Some(point.spawn(towards))
     }
+}
+
+/// The `power` of a light path that comes along `direction`, `from` in the frame, and is scattered `towards`.
+/// Unlike radiance, power is not scaled by refraction; with a shading normal, the other cosine counts (Veach
+/// 1997, sections 5.2 and 5.3).
+fn scattered(
+    power: Rgb,
+    point: &SurfacePoint,
+    (direction, from): (Vec3, Vec3),
+    (towards, sample): (Vec3, &BsdfSample),
+) -> Rgb {
+    let power = power * sample.weight * (sample.eta * sample.eta);
+    if point.frame.normal == point.geometric_normal {
+        return power;
+    }
+    let flat = |way: Vec3| way.dot(point.geometric_normal).abs();
+    power * (from.z * flat(towards) / (flat(direction) * sample.direction.z.abs()))
 }
 
 /// Photon memory of a task.

@@ -7,9 +7,17 @@ use crate::light::EMISSION_DIMENSIONS;
 use crate::transport::walk::block::Block;
 use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::light::{LOBE, LightPathState, OFFSETS, Visitor};
 use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::TRAPPED_FROM;
+use halflight_simd::kernels::shade::numbers::Offsets;
+
+/// Dimensions of the sampler at a vertex: scattered direction, lobe, Russian roulette.
+pub(super) const SCATTERING: u32 = 0;
+pub(super) const LOBE: u32 = 1;
+pub(super) const ROULETTE: u32 = 2;
+
+/// Offsets for the numbers of blocks of vertices; lights are not sampled.
+const OFFSETS: Offsets = Offsets { light: SCATTERING, choice: LOBE, scatter: SCATTERING, roulette: ROULETTE };
 
 /// Block of vertices of light subpaths. Their BSDFs are sampled together when the first of them scatters: no
 /// path of a block may.
@@ -28,28 +36,28 @@ impl<'a> Lanes<'a> {
     }
 
     /// Collects BSDFs at the points of the block and what their random numbers depend on, for `rays` whose
-    /// tags are indices of `states`. All paths have numbers of `place`.
+    /// tags give the number and the segments of a path. All paths have numbers of `place`.
     #[inline]
-    pub(super) fn gather<F: Features, V: Visitor>(
+    pub(super) fn gather<F: Features>(
         &mut self,
         context: &SceneContext<'a, F>,
-        (rays, states): (&[Ray], &[LightPathState]),
-        (place, max_depth): (u64, u32),
+        (rays, of_tag): (&[Ray], impl Fn(u32) -> Option<(u32, u32)>),
+        (place, dimensions, max_depth): (u64, u32, u32),
     ) {
         let Self { block, has, sampled } = self;
         (*has, *sampled) = (0, None);
         block.clear_bsdfs();
         for i in Set(block.points.met) {
-            let Some(state) = rays.get(i).and_then(|ray| states.get(ray.tag as usize)) else { continue };
+            let Some((number, segments)) = rays.get(i).and_then(|ray| of_tag(ray.tag)) else { continue };
             // Paths that may be trapped by total reflection are sampled one by one.
-            if state.segments >= max_depth.min(TRAPPED_FROM) {
+            if segments >= max_depth.min(TRAPPED_FROM) {
                 continue;
             }
-            (block.samples.place[i], block.samples.index[i]) = (place, state.number);
-            block.samples.dimension[i] = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
-            block.segments[i] = state.segments;
+            (block.samples.place[i], block.samples.index[i]) = (place, number);
+            block.samples.dimension[i] = EMISSION_DIMENSIONS + dimensions * (segments - 1);
+            block.segments[i] = segments;
             let bsdf = block.points.bsdf::<F>(context.scene, i);
-            block.put_bsdf::<F>(i, &bsdf, state.segments);
+            block.put_bsdf::<F>(i, &bsdf, segments);
             block.others[i] = bsdf;
             *has |= 1 << i;
         }

@@ -146,8 +146,8 @@ impl Rough<'_> {
         rough(from, self.rough).sample(viewer(from.row3(&self.surface.wo)), u)
     }
 
-    /// f |cos| and densities in the unit `direction`s, by the instructions of `level`, into the lanes of rough
-    /// dielectrics.
+    /// f |cos| and densities in the unit `direction`s, by the instructions of `level`, into the lanes of
+    /// rough dielectrics.
     pub fn light(&self, level: Level, direction: &Row3, value: &mut Row3, pdf: &mut Row) {
         level.dispatch(LightKernel(self, direction, value, pdf));
     }
