@@ -39,7 +39,7 @@ const PILOT_SHARE: f64 = 0.08;
 
 /// Work of a pixel of the pilot, and the fraction of the work that its pixels may take where it is larger.
 const RAYS_OF_PILOT_PIXEL: f64 = 300.0;
-const PILOT_PIXELS: f64 = 0.01;
+const PILOT_PIXELS: f64 = 0.02;
 
 /// Pixels of the picture for each of the pilot of counts, at most.
 const MOST_PART: usize = 4 * pilot::PART;

@@ -46,7 +46,7 @@ fn pilots_of_long_pictures_have_more_pixels_where_time_alone_ends_them() {
     let part = |goal| TRIAL.part_of_pilot(&goal);
     let of_time = |rays| Goal { rays: Some(rays), ..Goal::default() };
     assert_eq!(part(of_time(3e8)), 1);
-    assert_eq!(part(of_time(6e7)), 8);
+    assert_eq!(part(of_time(6e7)), 4);
     assert_eq!(part(of_time(1e6)), MOST_PART);
     assert_eq!(part(Goal { samples: Some(4096), ..of_time(9e7) }), pilot::PART);
 }
