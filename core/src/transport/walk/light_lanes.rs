@@ -19,8 +19,8 @@ pub(super) const ROULETTE: u32 = 2;
 /// Offsets for the numbers of blocks of vertices; lights are not sampled.
 const OFFSETS: Offsets = Offsets { light: SCATTERING, choice: LOBE, scatter: SCATTERING, roulette: ROULETTE };
 
-/// Block of vertices of light subpaths. Their BSDFs are sampled together when the first of them scatters: no
-/// path of a block may.
+/// Block of vertices of light subpaths. Their BSDFs are sampled together when the first of them scatters;
+/// where all paths of the block end, none is.
 pub(super) struct Lanes<'a> {
     pub(super) block: Block<'a>,
     /// Set of vertices whose BSDFs are in the block.
