@@ -63,7 +63,7 @@ type Expected = (&'static str, Room, usize, [[f64; 2]; 2]);
 const EXPECTED: [Expected; 8] = [
     ("shadow", SHADOW, 16, [[0.76, 0.69], [0.22, 0.28]]),
     ("shadow", SHADOW, 64, [[0.20, 0.16], [0.04, 0.055]]),
-    // One hemisphere does not determine the Hessian before a background that changes.
+    // The Hessian lacks a term of the background that changes behind the square (removed.md).
     ("walls", WALLS, 16, [[0.3, 1.0], [0.25, 1.0]]),
     ("walls", WALLS, 64, [[0.08, 0.6], [0.06, 0.6]]),
     ("open", OPEN, 16, [[0.2, 0.37], [0.23, 0.4]]),
