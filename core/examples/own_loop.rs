@@ -10,7 +10,7 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::method::path::PathTracing;
-use halflight_core::method::{Loop, Method, RenderContext, RenderState, Round, Shard};
+use halflight_core::method::{Loop, Method, PilotSize, RenderContext, RenderState, Round, Shard};
 use halflight_core::transport::{PathSettings, UNLIMITED};
 
 /// Pixels across and down.
@@ -24,7 +24,8 @@ fn main() -> Result<(), OutOfMemory> {
     let lights = LightSampler::build(&scene, &mut arena)?;
     let mut state = RenderState::new(SIZE, SIZE, Shard::WHOLE, &mut arena)?;
     let settings = PathSettings { width: SIZE, height: SIZE, seed: 1, max_depth: UNLIMITED };
-    let context = RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level };
+    let pilots = PilotSize::USUAL;
+    let context = RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level, pilots };
     let scratch = arena.slice(PathTracing::<DiffuseOnly>::scratch().bytes())?;
     let mut executor = Loop::new(scratch);
     let mut method = PathTracing::<DiffuseOnly>::new(&context, None, &mut executor)?;
