@@ -11,6 +11,7 @@ use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
 use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::rough::{Rough, RoughBlock};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
 use halflight_simd::kernels::shade::specular::{SpecularBlock, SpecularSamples};
@@ -172,6 +173,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         dielectric: metal,
     };
     check_coats(&mut rows, input.arbitrary()?, &surface, &coats, &specular);
+    check_rough(&mut rows, &surface, two_sided);
     check_sky(&mut rows, active, flags & 2 == 0);
     check_textures(&mut rows, flags);
     check_choices(&mut rows);
@@ -266,6 +268,28 @@ fn check_choices(rows: &mut Rows) {
         check("group", wanted.exists, &[found.group], &[wanted.group]);
         check("probability", wanted.exists, &[found.probability], &[wanted.probability]);
         check("remainder", wanted.exists, &[found.rest], &[wanted.rest]);
+    }
+}
+
+/// Rough dielectrics at every level against their scalar references.
+fn check_rough(rows: &mut Rows, surface: &SurfaceBlock, exists: u32) {
+    let eta = rows.unit().map(|x| 0.25 + 2.5 * x);
+    let rough =
+        RoughBlock { tint: rows.vectors(), eta, alpha: rows.unit(), exists: exists & surface.regular };
+    let (rough, direction) = (Rough { surface, rough: &rough }, rows.vectors());
+    let (u, lobe, before) = ([rows.unit(), rows.unit()], rows.unit(), (rows.vectors(), rows.row()));
+    let (mut wanted, mut sampled) = (before, ScatterBlock::EMPTY);
+    rough.light_reference(&direction, &mut wanted.0, &mut wanted.1);
+    let set = rough.sample_reference((&u, &lobe), &mut sampled);
+    for level in Level::detect().and_below() {
+        let (mut found, mut out) = (before, ScatterBlock::EMPTY);
+        rough.light(level, &direction, &mut found.0, &mut found.1);
+        check("value of rough glass", rough.rough.exists, &found.0, &wanted.0);
+        check("density of rough glass", rough.rough.exists, &[found.1], &[wanted.1]);
+        assert_eq!(rough.sample(level, (&u, &lobe), &mut out), set, "{level:?}");
+        check("direction by rough glass", set, &out.direction, &sampled.direction);
+        check("weight by rough glass", set, &out.weight, &sampled.weight);
+        check("density and refraction", set, &[out.pdf, out.eta], &[sampled.pdf, sampled.eta]);
     }
 }
 
