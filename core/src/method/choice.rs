@@ -301,16 +301,11 @@ impl Trial {
         Predictions { paths, noise, light_paths }
     }
 
-    /// Pixels of the picture for each of the pilot of light paths: few where time alone ends the picture. A
-    /// film by samples must find the same counts again when it is resumed.
+    /// Pixels of the picture for each of the pilot of light paths: few where time alone ends the picture.
     pub fn part_of_pilot(&self, goal: &Goal) -> usize {
-        match *goal {
-            Goal { rays: Some(rays), samples: None, error: None } => {
-                let pixels = PILOT_PIXELS * rays / RAYS_OF_PILOT_PIXEL;
-                ((self.pixels / pixels) as usize).clamp(1, MOST_PART)
-            }
-            _ => pilot::PART,
-        }
+        let Some(rays) = goal.rays_alone() else { return pilot::PART };
+        let pixels = PILOT_PIXELS * rays / RAYS_OF_PILOT_PIXEL;
+        ((self.pixels / pixels) as usize).clamp(1, MOST_PART)
     }
 
     /// Whether the pilot of light paths costs little beside the picture.

@@ -21,7 +21,7 @@ impl PilotSize {
     /// Usual size.
     pub const USUAL: Self = Self(1.0);
 
-    /// Size for a picture of so many `rays`: pilots are smaller where there is little time.
+    /// Size for a picture of this number of `rays`: pilots are smaller where there is little time.
     pub fn of_picture(rays: f64) -> Self {
         Self((PILOT_SHARE * rays / PILOT_RAYS).clamp(LEAST_SIZE, 1.0))
     }

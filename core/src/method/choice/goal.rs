@@ -24,6 +24,12 @@ pub struct Goal {
 }
 
 impl Goal {
+    /// Rays of a picture that time alone ends. A film by samples or error must find the same decisions again
+    /// when it is resumed.
+    pub fn rays_alone(&self) -> Option<f64> {
+        self.rays.filter(|_| self.samples.is_none() && self.error.is_none())
+    }
+
     /// Whether there is time for pilots beside the first samples of `pixels` pixels.
     pub fn affords_pilots(&self, pixels: usize) -> bool {
         self.rays.is_none_or(|rays| rays > FEWEST_SAMPLES * RAYS_PER_SAMPLE * pixels as f64)

@@ -18,7 +18,6 @@ use crate::transport::walk::dimension;
 use crate::transport::walk::points::{self, PointBlock};
 use crate::transport::walk::termination::{continuation_probability, is_cut};
 use crate::transport::walk::visibility::ShadowRays;
-use crate::transport::wavefront::BLOCK;
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 use glam::{Vec2, Vec3};
@@ -163,14 +162,11 @@ impl<'a, F: Features> Paths<'a, F> {
             coherence = Coherence::Incoherent;
             let mut left = 0;
             for i in 0..active {
-                if i.is_multiple_of(BLOCK) {
-                    let of_block = i..active.min(i + BLOCK);
-                    points.meet(&self.walk.context, (&rays[of_block.clone()], &hits[of_block]));
-                }
+                let met = self.walk.context.met(&mut points, (&rays[..active], &hits[..active]), i);
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
                 let numbers = numbers(path, ray.tag);
-                let end = (&ray, &hit, points.at(i % BLOCK));
+                let end = (&ray, &hit, met);
                 if let Some(next) = self.step(path, &numbers, end, shadows, part, counters) {
                     rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;

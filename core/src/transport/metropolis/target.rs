@@ -20,7 +20,6 @@ use crate::sampling::Mutation;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::points::{self, PointBlock};
-use crate::transport::wavefront::BLOCK;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
@@ -219,13 +218,10 @@ impl<'a, F: Features> Target<'a, F> {
             self.walk.context.nearest_batch(rays, Coherence::Incoherent, hits);
             let mut left = 0;
             for i in 0..active {
-                if i.is_multiple_of(BLOCK) {
-                    let of_block = i..active.min(i + BLOCK);
-                    let traced = (&lanes.rays[of_block.clone()], &lanes.hits[of_block]);
-                    points.meet(&self.walk.context, traced);
-                }
+                let traced = (&lanes.rays[..active], &lanes.hits[..active]);
+                let met = self.walk.context.met(&mut points, traced, i);
                 let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
-                if let Some(next) = step(lanes, (&ray, &hit, points.at(i % BLOCK)), counters) {
+                if let Some(next) = step(lanes, (&ray, &hit, met), counters) {
                     lanes.rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }

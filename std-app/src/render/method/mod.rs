@@ -196,21 +196,16 @@ impl<'a> RenderSetup<'a> {
         Goal { rays: self.most_rays(), samples: stop.most_samples(), error: stop.error }
     }
 
-    /// True if time alone ends the picture. A film by samples or error is resumed to the same bits.
-    fn is_timed(&self) -> bool {
-        matches!(self.goal(), Goal { rays: Some(_), samples: None, error: None })
-    }
-
     /// Size of pilots.
     fn pilots(&self) -> PilotSize {
-        self.most_rays().filter(|_| self.is_timed()).map_or(PilotSize::USUAL, PilotSize::of_picture)
+        self.goal().rays_alone().map_or(PilotSize::USUAL, PilotSize::of_picture)
     }
 
     /// Whether rays and density of records may be chosen: time alone ends the picture, and neither settings
     /// nor files fix them.
     pub(super) fn has_open_cache(&self) -> bool {
         let Settings { cache, load_cache, save_cache, .. } = self.settings;
-        self.is_timed() && cache.is_open() && load_cache.is_none() && save_cache.is_none()
+        self.goal().rays_alone().is_some() && cache.is_open() && load_cache.is_none() && save_cache.is_none()
     }
 
     /// Picture of a requested cache, if its time is limited.
