@@ -21,8 +21,8 @@ const FILLING_POWER: f64 = 0.4;
 
 /// Greatest fraction of the work for filling the coarsest cache, whose radii grow beyond it, and for a finer
 /// one: a cache that is cut has more error than a coarser one.
-const FILLING: f64 = 0.44;
-const FINER_FILLING: f64 = 0.4;
+const FILLING: f64 = 0.33;
+const FINER_FILLING: f64 = 0.3;
 
 /// Gather rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in
 /// records.

@@ -13,7 +13,7 @@ pub use goal::Goal;
 
 use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::caustics::{self, CausticPathTracing};
-use super::counts::{self, PilotNoise, pilot};
+use super::counts::{self, PilotNoise};
 use super::executor::{Executor, Passed};
 use super::pilot::PILOT_TILES;
 use super::{PilotSize, RenderContext, work_of_detail};
@@ -36,13 +36,6 @@ const BLOCK: usize = 64;
 /// Rays of the pilot of counts, and its greatest fraction of the work.
 const PILOT_RAYS: f64 = 5e5;
 const PILOT_SHARE: f64 = 0.08;
-
-/// Work of a pixel of the pilot, and the fraction of the work that its pixels may take where it is larger.
-const RAYS_OF_PILOT_PIXEL: f64 = 300.0;
-const PILOT_PIXELS: f64 = 0.02;
-
-/// Pixels of the picture for each of the pilot of counts, at most.
-const MOST_PART: usize = 4 * pilot::PART;
 
 /// Work of a ray of cached paths in a scene of few triangles, with its share of look-ups. It is below one
 /// because noise of light samples falls faster than with the inverse of their number.
@@ -299,13 +292,6 @@ impl Trial {
                 noise.light_paths.error(samples_of(noise.work) / LIGHT_PATHS_FACTOR, self.pixels)
             });
         Predictions { paths, noise, light_paths }
-    }
-
-    /// Pixels of the picture for each of the pilot of light paths: few where time alone ends the picture.
-    pub fn part_of_pilot(&self, goal: &Goal) -> usize {
-        let Some(rays) = goal.rays_alone() else { return pilot::PART };
-        let pixels = PILOT_PIXELS * rays / RAYS_OF_PILOT_PIXEL;
-        ((self.pixels / pixels) as usize).clamp(1, MOST_PART)
     }
 
     /// Whether the pilot of light paths costs little beside the picture.

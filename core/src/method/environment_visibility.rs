@@ -45,8 +45,9 @@ pub fn learn<'a, F: Features>(
         let mut kept = memory.take("windows", EnvironmentVisibility::footprint())?;
         let (slots, tables) = EnvironmentVisibility::memory(&mut kept)?;
 
+        let paths = context.pilots.of(integrator.visibility_paths());
         let passed = executor.pass(prepass.parts(), |_, (task, part), _| {
-            integrator.store_vertices(task, part);
+            integrator.store_vertices(task, paths, part);
             Ok(Counters::default())
         })?;
         // A place that was not looked at may see anything.
@@ -57,9 +58,10 @@ pub fn learn<'a, F: Features>(
         let Some((grid, count)) = prepass.assign_tables(slots) else {
             return Ok((*lights, Some(VisibilityGain::default())));
         };
+        let rays = context.pilots.of(integrator.environment_rays()) / count.max(1);
         let pieces = tables.iter_mut().zip(gains.iter_mut()).take(count);
         let passed = executor.pass(pieces, |number, (table, gain), worker| {
-            *gain = integrator.learn_table(&prepass, number, count, &mut worker.scratch, table)?;
+            *gain = integrator.learn_table(&prepass, number, rays, &mut worker.scratch, table)?;
             Ok(Counters::default())
         })?;
         if !passed.is_complete {

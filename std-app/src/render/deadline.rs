@@ -14,7 +14,7 @@ const FIRST_SAMPLE_GRACE: Duration = Duration::from_secs(5);
 /// Time after the end that the samples of tiles may take of it, and least time for them. A larger picture is
 /// cut then, and its gaps are filled (`gaps.rs`).
 const TILES_GRACE: Duration = Duration::from_millis(100);
-const TILES_TIME: Duration = Duration::from_millis(500);
+const TILES_TIME: Duration = Duration::from_millis(250);
 
 /// A time limit, an interrupt flag, or both; by default the render never ends.
 #[derive(Default)]

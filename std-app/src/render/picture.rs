@@ -31,6 +31,9 @@ const FULL_STEP: u32 = 8;
 /// Seconds per pixel and thread reserved for an error estimate before one has been timed.
 const ESTIMATING: f64 = 1e-7;
 
+/// Seconds per pixel reserved for the choice of audited pixels and their first samples.
+const OPENING_AUDIT: f64 = 6e-7;
+
 /// Seconds per pixel reserved for the picture and its file.
 const WRITING: f64 = 2e-7;
 
@@ -133,7 +136,11 @@ impl<'a> Progressive<'a> {
 
     /// The next round; `None` if a stop rule holds.
     fn plan(&self) -> Option<Plan> {
-        self.rounds.next(self.picture.clock.seconds(), self.estimating + self.ending)
+        let Picture { audit, setup: RenderSetup { settings, .. }, clock, .. } = &self.picture;
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let is_open = audit.as_ref().is_some_and(Audit::is_open);
+        let opening = if is_open { OPENING_AUDIT * pixels } else { 0.0 };
+        self.rounds.next(clock.seconds(), self.estimating + self.ending + opening)
     }
 
     /// Adds samples, estimates the error if due, writes the film file and reports progress.

@@ -19,10 +19,12 @@ use crate::transport::{CausticMerging, LightEstimator, PathIntegrator, RadiusSch
 const FEWEST_PATHS: usize = 16 * PATHS_PER_TASK;
 const MOST_PATHS: usize = 4096 * PATHS_PER_TASK;
 
-/// Fraction of the work of a picture for its first maps, one pair for samples and one for records; and rays
-/// whose time a light path takes, with its photons in a map.
+/// Fraction of the work of a picture for its first maps, and their number: of the first samples of paths; beside
+/// records a pair for samples, one for records of irradiance and one for view-bound records. And rays whose
+/// time a light path takes, with its photons in a map.
 const FIRST_SHARE: f64 = 0.2;
 const FIRST_MAPS: f64 = 4.0;
+const FIRST_MAPS_BESIDE_RECORDS: f64 = 6.0;
 const RAYS_PER_PATH: f64 = 16.0;
 
 /// Samples that share a pair of maps, at most: fewer would not fill the wavefront of a tile.
@@ -113,7 +115,8 @@ impl<'a> CausticPhotons<'a> {
     ) -> Result<Option<Self>, OutOfMemory> {
         let CausticSettings { beside_records, reserved, most_rays } = settings;
         let paths = emission.benefit.photon_budget() * PATHS_PER_SAMPLE * context.pixels() as f64;
-        let in_time = most_rays.map(|rays| rays * FIRST_SHARE / (FIRST_MAPS * RAYS_PER_PATH));
+        let maps = if beside_records { FIRST_MAPS_BESIDE_RECORDS } else { FIRST_MAPS };
+        let in_time = most_rays.map(|rays| rays * FIRST_SHARE / (maps * RAYS_PER_PATH));
         let paths = in_time.map_or(paths, |most| paths.min(most));
         let paths_per_sample = (paths as usize).clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted =

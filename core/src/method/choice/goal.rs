@@ -1,4 +1,6 @@
-//! End of a picture, and the trial that it affords.
+//! End of a picture, and the pilots that it affords.
+
+use crate::method::counts::pilot;
 
 /// Samples of a pixel in a trial.
 pub(super) const SAMPLES: u32 = 4;
@@ -8,6 +10,13 @@ pub(super) const SAMPLES: u32 = 4;
 const TRIAL_RAYS: f64 = 2.5e5;
 const TRIAL_SHARE: f64 = 0.25;
 const RAYS_PER_SAMPLE: f64 = 8.0;
+
+/// Work of a pixel of the pilot, and the fraction of the work that its pixels may take where it is larger.
+const RAYS_OF_PILOT_PIXEL: f64 = 300.0;
+const PILOT_PIXELS: f64 = 0.02;
+
+/// Fewest pixels of the pilot of counts where time alone ends the picture.
+const FEWEST_PILOT_PIXELS: f64 = 512.0;
 
 /// Fewest samples of a pixel for which pilots gain more than they cost.
 const FEWEST_SAMPLES: f64 = 4.0;
@@ -40,5 +49,12 @@ impl Goal {
         let samples = self.samples.map(|samples| f64::from(samples) * pixels as f64 * RAYS_PER_SAMPLE);
         let rays = [self.rays, samples].into_iter().flatten().fold(f64::INFINITY, f64::min);
         rays > TRIAL_RAYS / TRIAL_SHARE && self.affords_pilots(pixels)
+    }
+
+    /// Pixels of a picture of `pixels` for each of the pilot of light paths: few where time alone ends it.
+    pub fn part_of_pilot(&self, pixels: usize) -> usize {
+        let Some(rays) = self.rays_alone() else { return pilot::PART };
+        let few = (PILOT_PIXELS * rays / RAYS_OF_PILOT_PIXEL).max(FEWEST_PILOT_PIXELS);
+        ((pixels as f64 / few) as usize).max(1)
     }
 }

@@ -214,12 +214,16 @@ impl<'m> EnvironmentRays<'m> {
 }
 
 impl<F: Features> PathIntegrator<'_, F> {
-    /// Stores the vertices of task `task` in its part of the [`VisibilityPrepass`].
-    pub fn store_vertices(&self, task: usize, part: &mut [VisibilityVertex]) {
+    /// Paths of a task.
+    pub fn visibility_paths(&self) -> usize {
+        let pixels = self.settings.width as usize * self.settings.height as usize;
+        (pixels / 4 / TASKS).clamp(PATHS.start, PATHS.end)
+    }
+
+    /// Stores the vertices of so many `paths` of task `task` in its part of the [`VisibilityPrepass`].
+    pub fn store_vertices(&self, task: usize, paths: usize, part: &mut [VisibilityVertex]) {
         part.fill(VisibilityVertex { place: NO_PLACE, ..VisibilityVertex::default() });
         let crate::transport::PathSettings { width, height, seed, .. } = self.settings;
-        let pixels = width as usize * height as usize;
-        let paths = (pixels / 4 / TASKS).clamp(PATHS.start, PATHS.end);
         for (path, vertices) in part.chunks_mut(VERTICES).take(paths).enumerate() {
             let sampler = Sampler::new(seed ^ STREAM, 0, (task * paths + path) as u32);
             let [x, y] = sampler.pair(0);
@@ -279,7 +283,14 @@ impl<F: Features> PathIntegrator<'_, F> {
         Footprint::default().slice::<Ray>(BINS).slice::<f32>(BINS).slice::<Hit>(BINS)
     }
 
-    /// Learns table `number` of `count`. Returns its variances, weighted by the number of vertices.
+    /// Rays of all tables beside those of a first look at each.
+    pub fn environment_rays(&self) -> usize {
+        let pixels = self.settings.width as usize * self.settings.height as usize;
+        (RAYS_PER_PIXEL * pixels).clamp(RAYS.start, RAYS.end)
+    }
+
+    /// Learns table `number` by about so many `rays` after a first look. Returns its variances, weighted by
+    /// the number of vertices.
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::learn_table_scratch`] bytes.
@@ -287,7 +298,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         &self,
         prepass: &VisibilityPrepass,
         number: usize,
-        count: usize,
+        rays: usize,
         scratch: &mut Arena,
         table: &mut VisibilityTable,
     ) -> Result<VisibilityGain, OutOfMemory> {
@@ -308,9 +319,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         let near = VisibilityTable::smoothed(&VisibilityTable::smoothed(&squares));
         let open = || (0..near.len()).filter(|&bin| near[bin] > 0.0);
 
-        let pixels = self.settings.width as usize * self.settings.height as usize;
-        let all = (RAYS_PER_PIXEL * pixels).clamp(RAYS.start, RAYS.end);
-        let passes = (all / count.max(1) / open().count().max(1)).clamp(1, MAX_PASSES);
+        let passes = (rays / open().count().max(1)).clamp(1, MAX_PASSES);
         let mut sums: Bins = [0.0; _];
         squares.fill(0.0);
         for pass in 0..passes {

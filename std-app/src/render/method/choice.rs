@@ -44,7 +44,7 @@ pub(super) fn choose<'a, F: Features>(
     let is_audited = settings.audit.is_none_or(|share| share > 0.0);
     let light_paths = match trial.affords_light_paths(&goal) {
         true => {
-            let part = trial.part_of_pilot(&goal);
+            let part = goal.part_of_pilot(context.pixels());
             bidirectional::choose::<F>(setup, memory, (&techniques, part, trial.has_photons))?
         }
         false => None,
