@@ -8,6 +8,7 @@ use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
 use glam::Vec3;
 use halflight_simd::kernels::shade::coat::CoatSamples;
+use halflight_simd::kernels::shade::coat_apart::ApartSamples;
 use halflight_simd::kernels::shade::numbers::Offsets;
 use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::scatter::Scatter;
@@ -23,6 +24,8 @@ pub(in crate::transport) struct Sets {
     /// Paths that are too long.
     pub(in crate::transport) cut: u32,
     pub(in crate::transport) delta: u32,
+    /// Samples of coats apart from their bases.
+    pub(in crate::transport) coat: u32,
     pub(in crate::transport) transmits: u32,
 }
 
@@ -101,11 +104,18 @@ impl Block<'_> {
     fn sample_lobes(&mut self, level: Level, lobe: &Row, onward: u32, sets: &mut Sets) {
         let Block { points, coats, specular, rough, numbers, given, .. } = self;
         let surface = &points.surface;
-        if coats.exists & onward != 0 {
+        if coats.exists & !coats.apart & onward != 0 {
             let samples = CoatSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
             let [exists, delta] = samples.compute(level, given);
-            sets.active &= exists | !coats.exists;
-            sets.delta |= delta;
+            sets.active &= exists | !coats.exists | coats.apart;
+            sets.delta |= delta & !coats.apart;
+        }
+        if coats.apart & onward != 0 {
+            let samples = ApartSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
+            let of_lobes = samples.compute(level, given);
+            sets.active &= of_lobes.exists | !coats.apart;
+            sets.delta |= of_lobes.delta;
+            sets.coat = of_lobes.coat;
         }
         if rough.exists & onward != 0 {
             let exists = Rough { surface, rough }.sample(level, (&numbers.scatter, lobe), given);
