@@ -213,6 +213,7 @@ mod tests {
     use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic, RoughDielectric};
     use crate::sampling::Random;
     use crate::sampling::warp::uniform_sphere;
+    use crate::transport::walk::points::Set;
     use glam::Vec3;
     use halflight_simd::kernels::shade::at;
     use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
@@ -246,6 +247,8 @@ mod tests {
         let (mut block, level) = (Block::new(), Level::detect());
         for round in 0..200 {
             block.clear_bsdfs();
+            // Of coats of blocks before, apart from their bases.
+            block.coats.base_weight = [0.3; BLOCK];
             block.points.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
                 .map(|axis| axis.map(|coordinate| [coordinate; BLOCK]));
             let (mut lobe, mut all) = ([0.0; BLOCK], [Bsdf::Mirror(Mirror { reflectance: Rgb::ONE }); BLOCK]);
