@@ -75,10 +75,16 @@ impl Block<'_> {
             0 => [0.0; BLOCK],
             _ => self.samples.singles(level, offset),
         };
-        for i in Set(others) {
+        self.sample_by_lobes::<F>(level, &lobe, onward, sets);
+    }
+
+    /// [`Block::sample_given`] by known numbers of the lobes.
+    #[inline]
+    fn sample_by_lobes<F: Features>(&mut self, level: Level, lobe: &Row, onward: u32, sets: &mut Sets) {
+        for i in Set(onward & !self.in_lanes()) {
             self.sample_other::<F>(i, lobe[i], sets);
         }
-        self.sample_lobes(level, &lobe, onward, sets);
+        self.sample_lobes(level, lobe, onward, sets);
     }
 
     /// Samples the BSDF of vertex `i`, which lanes do not sample.
@@ -152,9 +158,32 @@ impl Block<'_> {
         self.samples.scattering(level, offsets, &mut self.numbers);
         let mut sets = Sets { active: onward, ..Sets::default() };
         self.sample_given::<F>(level, lobe, onward, &mut sets);
+        self.sample_all(level, &mut sets);
+        sets
+    }
+
+    /// Samples the BSDFs of the vertices `onward` by the numbers of the block and those of the lobes. They go
+    /// into the given samples.
+    #[inline]
+    pub(in crate::transport) fn sample_by_numbers<F: Features>(
+        &mut self,
+        level: Level,
+        lobe: &Row,
+        onward: u32,
+    ) -> Sets {
+        let mut sets = Sets { active: onward, ..Sets::default() };
+        self.given.eta = [1.0; BLOCK];
+        self.sample_by_lobes::<F>(level, lobe, onward, &mut sets);
+        self.sample_all(level, &mut sets);
+        sets
+    }
+
+    /// Adds the samples of the BSDFs that [`Scatter`] samples to those given.
+    #[inline]
+    pub(in crate::transport) fn sample_all(&mut self, level: Level, sets: &mut Sets) {
         let Block { points, bsdf, given, numbers, most, throughput, factor, eta_squared, .. } = &*self;
         let (surface, u, roulette) = (&points.surface, &numbers.scatter, &numbers.roulette);
-        let Sets { active, certain, .. } = sets;
+        let Sets { active, certain, .. } = *sets;
         let scatter = Scatter {
             surface,
             bsdf,
@@ -169,7 +198,6 @@ impl Block<'_> {
             certain,
         };
         (self.given, sets.active) = scatter.samples(level);
-        sets
     }
 
     /// The given sample of vertex `i`, with the `sets` of its block. The density of a delta lobe is infinite.
