@@ -7,6 +7,7 @@ use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
 use halflight_simd::kernels::shade::choice::{ChoiceBlock, Choices};
 use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
+use halflight_simd::kernels::shade::coat_apart::{ApartBlock, ApartLight, ApartSamples};
 use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
@@ -160,7 +161,9 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         alpha: rows.unit(),
         eta: rows.row(),
         mean: rows.vectors(),
+        base_weight: rows.unit(),
         exists: diffuse,
+        apart: diffuse & two_sided,
         dielectric: metal,
         transmittance: rows.vectors(),
         probability: rows.unit(),
@@ -173,6 +176,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         dielectric: metal,
     };
     check_coats(&mut rows, input.arbitrary()?, &surface, &coats, &specular);
+    check_apart(&mut rows, [active, triangles], &surface, &coats);
     check_rough(&mut rows, &surface, two_sided);
     check_sky(&mut rows, active, flags & 2 == 0);
     check_textures(&mut rows, flags);
@@ -314,6 +318,37 @@ fn check_textures(rows: &mut Rows, clamps: u32) {
         check("second texels", 0xffff, &found.second, &wanted.second);
         check("weights of texels", 0xffff, &found.weight, &wanted.weight);
         check("mixture", 0xffff, &mixed, &mixture);
+    }
+}
+
+/// Coats apart from their bases at every level against their scalar references.
+fn check_apart(rows: &mut Rows, [alone, balance]: [u32; 2], surface: &SurfaceBlock, coats: &CoatBlock) {
+    let tables: &CoatTables = &[[[-100; 16]; 12]; 11];
+    let light = LightBlock {
+        direction: rows.vectors(),
+        pdf: rows.row(),
+        radiance: rows.vectors(),
+        alone,
+        balance,
+        ..LightBlock::EMPTY
+    };
+    let (each, throughput, u, lobe) = (rows.unit(), rows.vectors(), [rows.unit(), rows.unit()], rows.unit());
+    let (each, throughput, supplied) = (&each, &throughput, balance);
+    let light = ApartLight { surface, coats, tables, light: &light, each, throughput, supplied };
+    let samples = ApartSamples { surface, coats, tables, u: &u, lobe: &lobe };
+    let (mut lit, mut wanted) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
+    light.reference(&mut lit);
+    let sets = samples.reference(&mut wanted);
+    for level in Level::detect().and_below() {
+        let (mut found, mut out) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
+        light.compute(level, &mut found);
+        assert_eq!(samples.compute(level, &mut out), sets, "{level:?}");
+        check("value", coats.apart, &found.value, &lit.value);
+        check("contribution", coats.apart, &found.contribution, &lit.contribution);
+        check("part of the base", coats.apart, &found.base, &lit.base);
+        check("direction", sets.exists, &out.direction, &wanted.direction);
+        check("weight", sets.exists, &out.weight, &wanted.weight);
+        check("density", sets.exists, &[out.pdf], &[wanted.pdf]);
     }
 }
 

@@ -27,6 +27,6 @@ mod merging;
 pub mod mis;
 pub mod reference;
 mod scattering;
-mod shaded;
+pub(in crate::transport) mod shaded;
 mod techniques;
 pub mod vertex;

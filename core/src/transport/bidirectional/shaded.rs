@@ -12,18 +12,18 @@ use halflight_simd::kernels::shade::at;
 
 /// A vertex of a block, with its light sample and next ray.
 #[derive(Clone, Copy)]
-pub(super) struct Shaded<'s> {
-    pub(super) block: &'s Block<'s>,
-    pub(super) sets: &'s Sets,
-    pub(super) i: usize,
+pub(in crate::transport) struct Shaded<'s> {
+    pub(in crate::transport) block: &'s Block<'s>,
+    pub(in crate::transport) sets: &'s Sets,
+    pub(in crate::transport) i: usize,
 }
 
 /// A light sample, with f |cos| of its direction and the density of BSDF sampling there.
-pub(super) struct Lit {
-    pub(super) light: LightSample,
-    pub(super) value: Rgb,
-    pub(super) pdf: f32,
-    pub(super) ray: Ray,
+pub(in crate::transport) struct Lit {
+    pub(in crate::transport) light: LightSample,
+    pub(in crate::transport) value: Rgb,
+    pub(in crate::transport) pdf: f32,
+    pub(in crate::transport) ray: Ray,
 }
 
 /// The next ray of a path.
@@ -37,7 +37,7 @@ pub(super) struct Next {
 
 impl<'s> Shaded<'s> {
     /// BSDF at the vertex.
-    pub(super) fn bsdf(&self) -> &'s Bsdf {
+    pub(in crate::transport) fn bsdf(&self) -> &'s Bsdf {
         &self.block.others[self.i & 15]
     }
 
@@ -46,7 +46,7 @@ impl<'s> Shaded<'s> {
     }
 
     /// The light sample of the vertex, with its radiance in `scene`.
-    pub(super) fn lit(&self, scene: &Scene) -> Option<Lit> {
+    pub(in crate::transport) fn lit(&self, scene: &Scene) -> Option<Lit> {
         let Self { block, i, .. } = *self;
         let (light, i) = (&block.light, i & 15);
         let [r, g, b, pdf] = block.shadows.contribution[i];

@@ -13,8 +13,10 @@ use crate::transport::bidirectional::light_pass::lens_point;
 use crate::transport::bidirectional::mis::{
     End, Sums, weight_of_connection, weight_of_hit, weight_of_light_sample, weight_of_splat,
 };
+use crate::transport::bidirectional::shaded::Lit;
 use crate::transport::bidirectional::vertex::normal_for_lights;
 use crate::transport::bidirectional::vertex::{reverse_pdf, scattering, scattering_from_light};
+use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::visibility::shadow_ray;
 use glam::{Vec2, Vec3};
 
@@ -81,17 +83,10 @@ impl<F: Features> Walk<'_, F> {
         contribution(Rgb::from(subpath.throughput) * radiance * weight, weight / of_paths)
     }
 
-    /// A light sample at `vertex` by the numbers `u`: its shadow ray, with the light that arrives if nothing
-    /// is in its way.
-    pub(super) fn light_sample(
-        &self,
-        subpath: &Subpath,
-        vertex: &Vertex,
-        u: [f32; 3],
-    ) -> Option<(Ray, Contribution)> {
-        let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
-        let Vertex { point, bsdf, wo, sums: [sums, _], is_bent, .. } = vertex;
+    /// Samples a light at `vertex` by the numbers `u`, without lanes.
+    pub(super) fn sample_light(&self, vertex: &Vertex, u: [f32; 3]) -> Option<Lit> {
+        let SceneContext { scene, lights, .. } = self.context;
+        let Vertex { point, bsdf, wo, .. } = vertex;
         let light = lights.sample(scene, point.position, normal_for_lights(point, bsdf), u)?;
         let wi = point.frame.to_local(light.direction);
         if !point.sides_agree(wi, light.direction) {
@@ -101,16 +96,31 @@ impl<F: Features> Walk<'_, F> {
         if value == Rgb::ZERO {
             return None;
         }
+        Some(Lit { light, value, pdf, ray: shadow_ray(point, &light)? })
+    }
+
+    /// The light sample `lit` at `vertex`: its shadow ray, with the light that arrives if nothing is in its
+    /// way.
+    pub(super) fn light_sample(
+        &self,
+        subpath: &Subpath,
+        vertex: &Vertex,
+        Lit { light, value, pdf, ray }: Lit,
+    ) -> Option<(Ray, Contribution)> {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let Vertex { point, bsdf, wo, sums: [sums, _], is_bent, .. } = vertex;
         let densities = (if light.delta { 0.0 } else { pdf }, light.pdf);
         let (mut emitted, mut density) = ((0.0, 0.0), 0.0);
         if self.has_light_paths() && !is_bent {
+            let wi = point.frame.to_local(light.direction);
             emitted = (vertex.cos(light.direction), reverse_pdf(context, (point, bsdf), *wo, wi));
             density = emission.density_of_sample(scene, lights, &light, point.position);
         }
         let weight = weight_of_light_sample(counts, sums, densities, density, emitted);
         let of_paths = weight_of_light_sample(&PATH_TRACING, &Sums::default(), densities, 0.0, (0.0, 0.0));
         let radiance = Rgb::from(subpath.throughput) * value * light.radiance * (weight / light.pdf);
-        Some((shadow_ray(point, &light)?, contribution(radiance, weight / of_paths)?))
+        Some((ray, contribution(radiance, weight / of_paths)?))
     }
 
     /// The connection of a camera subpath at `vertex` with a `light` subpath that has ended at `other`.

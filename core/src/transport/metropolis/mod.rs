@@ -12,6 +12,7 @@ mod join;
 pub mod lanes;
 pub(in crate::transport) mod numbers;
 pub mod paths;
+mod shading;
 pub mod split;
 mod subpath;
 pub mod target;

@@ -163,6 +163,19 @@ impl Numbers for EmissionNumbers<'_> {
     }
 }
 
+/// The numbers of a vertex in lanes.
+pub(super) enum VertexNumbers {
+    /// Those of a sequence, by its place and the index of its point: of a light sample and of scattering.
+    Sequence((u64, u32)),
+    /// Numbers of a light sample, and of scattering, if the vertex takes them.
+    Given {
+        /// Point on a light and choice of the light.
+        light: Option<[f32; 3]>,
+        /// Direction and lobe.
+        scattering: Option<[f32; 3]>,
+    },
+}
+
 /// The numbers of a whole path of path tracing.
 pub(super) trait PathNumbers {
     /// Point of the lens.
@@ -175,30 +188,54 @@ pub(super) trait PathNumbers {
     fn roulette(&self, n: u32) -> f32;
     /// A surface with a cut-out after `n` others, scattered at or passed.
     fn opacity(&self, n: u32) -> f32;
+    /// All numbers of a light sample and of scattering at the vertex at the end of the `n`th segment.
+    fn vertex(&self, n: u32) -> VertexNumbers;
 }
 
-impl PathNumbers for Sampler {
+/// The numbers of a path of a pixel.
+pub(super) struct PixelNumbers {
+    sampler: Sampler,
+    place: (u64, u32),
+}
+
+impl PixelNumbers {
+    /// Those of sample number `sample` of `pixel` in the picture of `seed`.
+    pub(super) fn new(seed: u32, pixel: u32, sample: u32) -> Self {
+        Self { sampler: Sampler::new(seed, pixel, sample), place: Sampler::place(seed, pixel, sample) }
+    }
+
+    /// Position in the pixel.
+    pub(super) fn pixel(&self) -> [f32; 2] {
+        self.sampler.pair(dimension::PIXEL)
+    }
+}
+
+impl PathNumbers for PixelNumbers {
     fn lens(&self) -> [f32; 2] {
-        self.pair(dimension::LENS)
+        self.sampler.pair(dimension::LENS)
     }
 
     fn light(&self, n: u32) -> [f32; 3] {
         let first = dimension::vertex(n);
-        let [u, v] = self.pair(first + dimension::LIGHT);
-        [u, v, self.single(first + dimension::LIGHT_CHOICE)]
+        let [u, v] = self.sampler.pair(first + dimension::LIGHT);
+        [u, v, self.sampler.single(first + dimension::LIGHT_CHOICE)]
     }
 
     fn scattering(&self, n: u32) -> [f32; 3] {
-        let [u, v] = dimension::scattering(self, n);
-        [u, v, self.single(dimension::vertex(n) + dimension::LOBE)]
+        let [u, v] = dimension::scattering(&self.sampler, n);
+        [u, v, self.sampler.single(dimension::vertex(n) + dimension::LOBE)]
     }
 
     fn roulette(&self, n: u32) -> f32 {
-        self.single(dimension::vertex(n) + dimension::ROULETTE)
+        self.sampler.single(dimension::vertex(n) + dimension::ROULETTE)
     }
 
     fn opacity(&self, n: u32) -> f32 {
-        self.single(dimension::CROSSING + n)
+        self.sampler.single(dimension::CROSSING + n)
+    }
+
+    fn vertex(&self, _: u32) -> VertexNumbers {
+        VertexNumbers::Sequence(self.place)
     }
 }
 
@@ -230,5 +267,12 @@ impl PathNumbers for Point<'_> {
 
     fn opacity(&self, n: u32) -> f32 {
         self.opacity(n, false)
+    }
+
+    fn vertex(&self, n: u32) -> VertexNumbers {
+        VertexNumbers::Given {
+            light: Some(self.light(n)),
+            scattering: Some(PathNumbers::scattering(self, n)),
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! The path tracer beside Markov chains: it adds its part of the light of each path ([`Split`]). The same
 //! paths by mutated numbers, with the other part, are the points of PSSMLT (Kelemen et al. 2002).
 
-use super::numbers::PathNumbers;
+use super::numbers::{PathNumbers, PixelNumbers};
+use super::shading::{ShadedHit, Shading};
 use super::split::{Contribution, Split};
 use super::subpath::{Met, PATH_TRACING, Shadows, Subpath, Walk};
 use crate::Rgb;
@@ -11,11 +12,8 @@ use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use crate::geometry::{Hit, Ray};
 use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::sampling::Sampler;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::dimension;
-use crate::transport::walk::points::{self, PointBlock};
 use crate::transport::walk::termination::{continuation_probability, is_cut};
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
@@ -108,12 +106,12 @@ impl<'a, F: Features> Paths<'a, F> {
         let tile = Tile::new(width, height, tile);
         let mut counters = Counters::default();
         for sample in samples {
-            let sampler = |x, y| Sampler::new(self.seed, y * width + x, sample);
+            let sampler = |x, y| PixelNumbers::new(self.seed, y * width + x, sample);
             let mut count = 0;
             for place in 0..PIXELS_PER_TILE {
                 let Some((x, y)) = tile.pixel(place) else { continue };
                 let numbers = sampler(x, y);
-                let raster = Vec2::new(x as f32, y as f32) + Vec2::from(numbers.pair(dimension::PIXEL));
+                let raster = Vec2::new(x as f32, y as f32) + Vec2::from(numbers.pixel());
                 (paths[count], rays[count]) = self.start((corner + place) as u32, raster, &numbers);
                 rays[count].tag = count as u32;
                 count += 1;
@@ -154,7 +152,7 @@ impl<'a, F: Features> Paths<'a, F> {
         counters: &mut Counters,
     ) {
         let mut active = count;
-        let mut points = PointBlock::new();
+        let mut shading = Shading::new();
         let mut coherence = if part == Part::Paths { Coherence::Coherent } else { Coherence::Incoherent };
         while active > 0 {
             counters.rays += active as u64;
@@ -162,7 +160,13 @@ impl<'a, F: Features> Paths<'a, F> {
             coherence = Coherence::Incoherent;
             let mut left = 0;
             for i in 0..active {
-                let met = self.walk.context.met(&mut points, (&rays[..active], &hits[..active]), i);
+                let vertex = |tag: u32| {
+                    let path = paths.get(tag as usize)?;
+                    let segments = path.subpath.segments;
+                    (segments < self.max_depth).then(|| (segments, numbers(path, tag).vertex(segments)))
+                };
+                let traced = (&rays[..active], &hits[..active]);
+                let met = shading.hit(&self.walk.context, traced, i, vertex);
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
                 let numbers = numbers(path, ray.tag);
@@ -194,7 +198,7 @@ impl<'a, F: Features> Paths<'a, F> {
         &self,
         path: &mut Path,
         numbers: &impl PathNumbers,
-        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
+        (ray, hit, shaded): (&Ray, &Hit, ShadedHit),
         shadows: &mut Shadows,
         part: Part,
         counters: &mut Counters,
@@ -202,7 +206,8 @@ impl<'a, F: Features> Paths<'a, F> {
         let direction = Vec3::from(ray.direction);
         let segments = path.subpath.segments;
         let opacity = |n| numbers.opacity(n);
-        let point = match self.walk.meet(&mut path.subpath, (ray, hit, met), true, opacity, counters) {
+        let met = (ray, hit, shaded.met);
+        let point = match self.walk.meet(&mut path.subpath, met, true, opacity, counters) {
             Met::Surface(point) => point,
             Met::Passed(next) => return Some(next),
             Met::Lost => return None,
@@ -218,16 +223,18 @@ impl<'a, F: Features> Paths<'a, F> {
         if segments >= self.max_depth {
             return None;
         }
-        let surface = (point, met.bsdf::<F>(self.walk.context.scene));
+        let scene = self.walk.context.scene;
+        let surface = (point, shaded.bsdf::<F>(scene));
         let vertex = self.walk.camera_vertex(&path.subpath, surface, direction, [0.5; 2]);
+        let sample = || self.walk.sample_light(&vertex, numbers.light(segments));
         if !vertex.bsdf.is_delta()
-            && let Some((shadow, arrives)) =
-                self.walk.light_sample(&path.subpath, &vertex, numbers.light(segments))
+            && let Some(lit) = shaded.lit(scene, sample)
+            && let Some((shadow, arrives)) = self.walk.light_sample(&path.subpath, &vertex, lit)
         {
             shadows.push(ray.tag, shadow, self.part(path, segments + 1, part, &arrives));
         }
-        let u = numbers.scattering(segments);
-        let (next, sample) = self.walk.scatter(&mut path.subpath, &vertex, false, u)?;
+        let sample = shaded.scattered(|| vertex.bsdf.sample::<F>(vertex.wo, numbers.scattering(segments)))?;
+        let next = self.walk.scatter(&mut path.subpath, &vertex, false, &sample)?;
         path.eta_squared *= sample.eta * sample.eta;
         let throughput = Rgb::from(path.subpath.throughput);
         let probability = continuation_probability(segments, throughput * path.eta_squared);

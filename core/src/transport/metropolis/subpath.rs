@@ -160,14 +160,14 @@ impl<'a, F: Features> Walk<'a, F> {
 
     /// The end of `ray`, which `met` a surface at `hit`. `opacity` gives the random number of a surface with
     /// a cut-out after n others.
-    pub(super) fn meet(
+    pub(super) fn meet<'p>(
         &self,
         subpath: &mut Subpath,
-        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
+        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'p>),
         at_lens: bool,
         opacity: impl Fn(u32) -> f32,
         counters: &mut Counters,
-    ) -> Met<'a> {
+    ) -> Met<'p> {
         if !hit.is_some() {
             return Met::Nothing;
         }
@@ -251,16 +251,15 @@ impl<'a, F: Features> Walk<'a, F> {
         (!is_bent(&point, wo)).then_some(Vertex { point, bsdf, back: -direction, wo, sums, is_bent: false })
     }
 
-    /// The subpath goes on from `vertex` by the numbers `u`. Its next ray, and the sample of the BSDF.
+    /// The subpath goes on from `vertex` by a `sample` of the BSDF. Its next ray.
     pub(super) fn scatter(
         &self,
         subpath: &mut Subpath,
         vertex: &Vertex,
         from_light: bool,
-        u: [f32; 3],
-    ) -> Option<(Ray, BsdfSample)> {
+        sample: &BsdfSample,
+    ) -> Option<Ray> {
         let Vertex { point, bsdf, back, wo, .. } = vertex;
-        let sample = bsdf.sample::<F>(*wo, u)?;
         let towards = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, towards) {
             return None;
@@ -278,7 +277,7 @@ impl<'a, F: Features> Walk<'a, F> {
         if !(throughput.max_element() > 0.0 && throughput.is_finite()) {
             return None;
         }
-        let sums = self.sums_after(vertex, &sample, towards, from_light);
+        let sums = self.sums_after(vertex, sample, towards, from_light);
         [subpath.sums, subpath.path_sums] = sums;
         subpath.throughput = throughput.to_array();
         subpath.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
@@ -286,7 +285,7 @@ impl<'a, F: Features> Walk<'a, F> {
         subpath.normal = normal_for_lights(point, bsdf).to_array();
         subpath.triangle = point.triangle;
         subpath.segments += 1;
-        Some((point.spawn(towards), sample))
+        Some(point.spawn(towards))
     }
 
     fn sums_after(&self, vertex: &Vertex, sample: &BsdfSample, towards: Vec3, from_light: bool) -> [Sums; 2] {

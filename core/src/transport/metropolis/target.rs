@@ -5,8 +5,10 @@
 //! techniques. A point of PSSMLT (Kelemen et al. 2002) is a whole path of path tracing.
 
 use super::lanes::{LANES, Lanes};
-use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail, slots_of_technique};
+use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail};
+use super::numbers::{VertexNumbers, slots_of_technique};
 use super::paths::{Part, Path, Paths};
+use super::shading::{ShadedHit, Shading};
 use super::split::{Contribution, MIN_SEGMENTS, Split};
 use super::subpath::{Met, Subpath, Vertex, Walk};
 use super::technique::{Technique, technique};
@@ -19,7 +21,6 @@ use crate::light::{EmissionSampler, luminance};
 use crate::sampling::Mutation;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::points::{self, PointBlock};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
@@ -196,22 +197,30 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
-        self.advance(lanes, active, counters, |lanes, end, counters| {
+        let numbers = |lanes: &Lanes, tag: u32| {
+            let (Lane { technique, segments, point, .. }, subpath) =
+                (lane(tag as usize), lanes.lights.get(tag as usize)?);
+            let goes_on = subpath.segments < technique.subpaths(segments)[0];
+            let scattering = Some(point.scattering(subpath.segments, true));
+            goes_on.then_some((subpath.segments, VertexNumbers::Given { light: None, scattering }))
+        };
+        self.advance((lanes, active), counters, numbers, |lanes, end, counters| {
             let lane = lane(end.0.tag as usize);
             self.light_step(&lane, lanes, end, &mut values[lane.number], counters)
         });
     }
 
     /// Advances subpaths by the first `active` rays of `lanes`, whose tags are their lanes, until none is
-    /// left. One `step` handles the end of a ray and gives the next.
+    /// left. `numbers` gives the segments of a lane's subpath and the numbers of its vertex; one `step`
+    /// handles the end of a ray and gives the next.
     fn advance(
         &self,
-        lanes: &mut Lanes,
-        mut active: usize,
+        (lanes, mut active): (&mut Lanes, usize),
         counters: &mut Counters,
-        mut step: impl FnMut(&mut Lanes, (&Ray, &Hit, points::Met<'_, 'a>), &mut Counters) -> Option<Ray>,
+        numbers: impl Fn(&Lanes, u32) -> Option<(u32, VertexNumbers)>,
+        mut step: impl FnMut(&mut Lanes, (&Ray, &Hit, ShadedHit), &mut Counters) -> Option<Ray>,
     ) {
-        let mut points = PointBlock::new();
+        let mut shading = Shading::new();
         while active > 0 {
             counters.rays += active as u64;
             let (rays, hits) = (&lanes.rays[..active], &mut lanes.hits[..active]);
@@ -219,9 +228,10 @@ impl<'a, F: Features> Target<'a, F> {
             let mut left = 0;
             for i in 0..active {
                 let traced = (&lanes.rays[..active], &lanes.hits[..active]);
-                let met = self.walk.context.met(&mut points, traced, i);
+                let of_tag = |tag| numbers(lanes, tag);
+                let shaded = shading.hit(&self.walk.context, traced, i, of_tag);
                 let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
-                if let Some(next) = step(lanes, (&ray, &hit, met), counters) {
+                if let Some(next) = step(lanes, (&ray, &hit, shaded), counters) {
                     lanes.rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }
@@ -234,26 +244,27 @@ impl<'a, F: Features> Target<'a, F> {
         &self,
         lane: &Lane,
         lanes: &mut Lanes,
-        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
+        (ray, hit, shaded): (&Ray, &Hit, ShadedHit),
         value: &mut Value,
         counters: &mut Counters,
     ) -> Option<Ray> {
         let Lane { number, segments, technique, point: numbers } = *lane;
         let subpath = &mut lanes.lights[number];
         let opacity = |n| numbers.opacity(n, true);
-        let point = match self.walk.meet(subpath, (ray, hit, met), false, opacity, counters) {
+        let point = match self.walk.meet(subpath, (ray, hit, shaded.met), false, opacity, counters) {
             Met::Surface(point) => point,
             Met::Passed(next) => return Some(next),
             Met::Nothing | Met::Lost => return None,
         };
         let vertex = self.walk.light_vertex(
             subpath,
-            (point, met.bsdf::<F>(self.walk.context.scene)),
+            (point, shaded.bsdf::<F>(self.walk.context.scene)),
             ray.direction.into(),
         )?;
         if subpath.segments < technique.subpaths(segments)[0] {
-            let u = numbers.scattering(subpath.segments, true);
-            return self.walk.scatter(subpath, &vertex, true, u).map(|(next, _)| next);
+            let u = || numbers.scattering(subpath.segments, true);
+            let sample = shaded.scattered(|| vertex.bsdf.sample::<F>(vertex.wo, u()))?;
+            return self.walk.scatter(subpath, &vertex, true, &sample);
         }
         self.walk.end(subpath, &vertex);
         if technique == Technique::Splat {
@@ -287,7 +298,22 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
-        self.advance(lanes, active, counters, |lanes, end, counters| {
+        let numbers = |lanes: &Lanes, tag: u32| {
+            let (Lane { technique, segments, point, .. }, subpath) =
+                (lane(tag as usize), lanes.cameras.get(tag as usize)?);
+            let numbers = match technique {
+                _ if subpath.segments < technique.subpaths(segments)[1] => VertexNumbers::Given {
+                    light: None,
+                    scattering: Some(point.scattering(subpath.segments, false)),
+                },
+                Technique::LightSample => {
+                    VertexNumbers::Given { light: Some(point.light_sample()), scattering: None }
+                }
+                _ => return None,
+            };
+            Some((subpath.segments, numbers))
+        };
+        self.advance((lanes, active), counters, numbers, |lanes, end, counters| {
             let lane = lane(end.0.tag as usize);
             self.camera_step(&lane, lanes, end, &mut values[lane.number], counters)
         });
@@ -297,7 +323,7 @@ impl<'a, F: Features> Target<'a, F> {
         &self,
         lane: &Lane,
         lanes: &mut Lanes,
-        (ray, hit, met): (&Ray, &Hit, points::Met<'_, 'a>),
+        (ray, hit, shaded): (&Ray, &Hit, ShadedHit),
         value: &mut Value,
         counters: &mut Counters,
     ) -> Option<Ray> {
@@ -307,7 +333,7 @@ impl<'a, F: Features> Target<'a, F> {
         let opacity = |n| numbers.opacity(n, false);
         let is_last = subpath.segments == technique.subpaths(segments)[1];
         let is_hit = technique == Technique::Hit && is_last;
-        let point = match self.walk.meet(subpath, (ray, hit, met), true, opacity, counters) {
+        let point = match self.walk.meet(subpath, (ray, hit, shaded.met), true, opacity, counters) {
             Met::Surface(point) => point,
             Met::Passed(next) => return Some(next),
             Met::Nothing if is_hit => {
@@ -322,17 +348,22 @@ impl<'a, F: Features> Target<'a, F> {
             value.radiance = self.part(value.pixel, segments, &seen).to_array();
             return None;
         }
-        let surface = (point, met.bsdf::<F>(self.walk.context.scene));
+        let surface = (point, shaded.bsdf::<F>(self.walk.context.scene));
         let vertex = self.walk.camera_vertex(subpath, surface, direction, numbers.lens());
         if !is_last {
-            let u = numbers.scattering(subpath.segments, false);
-            return self.walk.scatter(subpath, &vertex, false, u).map(|(next, _)| next);
+            let u = || numbers.scattering(subpath.segments, false);
+            let sample = shaded.scattered(|| vertex.bsdf.sample::<F>(vertex.wo, u()))?;
+            return self.walk.scatter(subpath, &vertex, false, &sample);
         }
         if vertex.bsdf.is_delta() {
             return None;
         }
         let (shadow, contribution) = match technique {
-            Technique::LightSample => self.walk.light_sample(subpath, &vertex, numbers.light_sample())?,
+            Technique::LightSample => {
+                let sample = || self.walk.sample_light(&vertex, numbers.light_sample());
+                let lit = shaded.lit(self.walk.context.scene, sample)?;
+                self.walk.light_sample(subpath, &vertex, lit)?
+            }
             _ => {
                 let (light, end) =
                     (&lanes.lights[number], (&lanes.end_rays[number], &lanes.end_hits[number]));

@@ -6,6 +6,7 @@ use crate::transport::walk::points::PointBlock;
 use crate::transport::walk::termination::TRAPPED_FROM;
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::coat::CoatBlock;
+use halflight_simd::kernels::shade::coat_apart::ApartBlock;
 use halflight_simd::kernels::shade::direct::{LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::EmitterBlock;
 use halflight_simd::kernels::shade::numbers::{SampleBlock, VertexNumbers};
@@ -21,6 +22,9 @@ pub(in crate::transport) struct Block<'a> {
     pub(in crate::transport) points: PointBlock<'a>,
     pub(in crate::transport) bsdf: BsdfBlock,
     pub(in crate::transport) coats: CoatBlock,
+    pub(in crate::transport) apart: ApartBlock,
+    /// Set of coats apart from bases that take no light sample.
+    pub(in crate::transport) supplied: u32,
     pub(in crate::transport) specular: SpecularBlock,
     pub(in crate::transport) rough: RoughBlock,
     /// Set of coats without a base and without a rough lobe.
@@ -81,6 +85,8 @@ impl<'a> Block<'a> {
             points: PointBlock::new(),
             bsdf: BsdfBlock::EMPTY,
             coats: CoatBlock::EMPTY,
+            apart: ApartBlock::EMPTY,
+            supplied: 0,
             specular: SpecularBlock::EMPTY,
             rough: RoughBlock::EMPTY,
             smooth_coats: 0,
@@ -180,11 +186,21 @@ impl<'a> Block<'a> {
         self.specular.exists |= one;
     }
 
+    /// Separates the coat of vertex `i` from its base, which has this weight in the choice of the lobe, and
+    /// takes light samples unless it `is_supplied`.
+    #[inline]
+    pub(in crate::transport) fn separate_coat(&mut self, i: usize, base_weight: f32, is_supplied: bool) {
+        self.coats.base_weight[i & 15] = base_weight;
+        self.coats.apart |= self.coats.exists & 1 << i;
+        self.supplied |= u32::from(is_supplied) << i;
+    }
+
     /// Removes the BSDFs of all vertices.
     #[inline]
     pub(in crate::transport) fn clear_bsdfs(&mut self) {
         (self.bsdf.diffuse, self.bsdf.metal, self.rough.exists) = (0, 0, 0);
         (self.coats.exists, self.coats.dielectric, self.smooth_coats) = (0, 0, 0);
+        (self.coats.apart, self.supplied) = (0, 0);
         let SpecularBlock { exists, metal, dielectric, .. } = &mut self.specular;
         (*exists, *metal, *dielectric) = (0, 0, 0);
     }
@@ -197,9 +213,11 @@ mod tests {
     use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic, RoughDielectric};
     use crate::sampling::Random;
     use crate::sampling::warp::uniform_sphere;
+    use crate::transport::walk::points::Set;
     use glam::Vec3;
     use halflight_simd::kernels::shade::at;
     use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
+    use halflight_simd::kernels::shade::coat_apart::ApartSamples;
     use halflight_simd::kernels::shade::rough::Rough;
     use halflight_simd::kernels::shade::specular::SpecularSamples;
 
@@ -229,6 +247,8 @@ mod tests {
         let (mut block, level) = (Block::new(), Level::detect());
         for round in 0..200 {
             block.clear_bsdfs();
+            // Of coats of blocks before, apart from their bases.
+            block.coats.base_weight = [0.3; BLOCK];
             block.points.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
                 .map(|axis| axis.map(|coordinate| [coordinate; BLOCK]));
             let (mut lobe, mut all) = ([0.0; BLOCK], [Bsdf::Mirror(Mirror { reflectance: Rgb::ONE }); BLOCK]);
@@ -275,6 +295,53 @@ mod tests {
                 let wanted = (sample.direction.to_array(), sample.weight.to_array(), sample.eta);
                 assert_eq!(found, wanted, "{bsdf:?}");
                 assert_eq!(given.pdf[i], if sample.delta { f32::INFINITY } else { sample.pdf }, "{bsdf:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_have_the_bits_of_single_coats_apart() {
+        let random = Random::new(6, 0);
+        let (mut block, level) = (Block::new(), Level::detect());
+        block.points.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            .map(|axis| axis.map(|coordinate| [coordinate; BLOCK]));
+        (block.throughput, block.light.radiance) = ([[1.0; BLOCK]; 3], [[1.0; BLOCK]; 3]);
+        (block.light.pdf, block.light.alone) = ([1.0; BLOCK], 0xffff);
+        for round in 0..200 {
+            block.clear_bsdfs();
+            let mut lobe = [0.0; BLOCK];
+            for i in 0..BLOCK {
+                let n = 16 * round + i as u32;
+                let number = |k: u32| random.single(20 * n + k);
+                let wo = uniform_sphere([number(6), number(7)]);
+                put(&mut block.points.surface.wo, i, [wo.x, wo.y, wo.z.abs()]);
+                put(&mut block.light.direction, i, uniform_sphere([number(8), number(9)]).to_array());
+                (block.numbers.scatter[0][i], block.numbers.scatter[1][i]) = (number(10), number(11));
+                lobe[i] = number(12);
+                block.put_bsdf::<All>(i, &surfaces(&random, n), 1);
+                block.separate_coat(i, [0.0, 0.3, 1.0][n as usize % 3], n.is_multiple_of(4));
+            }
+            block.coats.see(level, &block.points.surface, &COATS);
+            block.weigh_apart(level);
+            let Block { points, coats, given, numbers, .. } = &mut block;
+            let (surface, u) = (&points.surface, &numbers.scatter);
+            let samples = ApartSamples { surface, coats, tables: &COATS, u, lobe: &lobe };
+            let sets = samples.compute(level, given);
+            for i in Set(block.coats.apart) {
+                let (bsdf, weight) = (&block.others[i], block.coats.base_weight[i]);
+                let (wo, wi) = (at(&block.points.surface.wo, i), at(&block.light.direction, i));
+                let [base, coat] = bsdf.evaluate_apart::<All>(wo.into(), wi.into(), weight).map(|of| of.0);
+                let base = if block.supplied >> i & 1 == 1 { Rgb::ZERO } else { base };
+                assert_eq!(Rgb::from(at(&block.apart.value, i)), base + coat, "{bsdf:?}");
+                assert_eq!(Rgb::from(at(&block.apart.contribution, i)), base + coat, "{bsdf:?}");
+                let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobe[i]];
+                let sample = bsdf.sample_apart::<All>(wo.into(), u, weight);
+                assert_eq!(sets.exists >> i & 1 == 1, sample.is_some(), "{bsdf:?}");
+                let Some((sample, is_coat)) = sample else { continue };
+                assert_eq!([sets.delta, sets.coat].map(|set| set >> i & 1 == 1), [sample.delta, is_coat]);
+                let found = (at(&block.given.direction, i), at(&block.given.weight, i), block.given.pdf[i]);
+                let pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
+                assert_eq!(found, (sample.direction.to_array(), sample.weight.to_array(), pdf), "{bsdf:?}");
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Light samples of the vertices of a block: choice of the lights, points on them, and the BSDFs' values in
 //! their directions.
 
+use crate::Level;
 use crate::bsdf::{COATS, Features};
 use crate::light::{ChosenLight, LightSample, emitted};
 use crate::transport::walk::block::Block;
@@ -8,6 +9,7 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::points::Set;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::shade::coat::CoatLight;
+use halflight_simd::kernels::shade::coat_apart::ApartLight;
 use halflight_simd::kernels::shade::emitter::EmitterSamples;
 use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::{BLOCK, at, put};
@@ -40,7 +42,7 @@ impl Block<'_> {
             put(&mut self.value, i, f.to_array());
             self.pdf[i] = pdf;
         }
-        if self.coats.exists & self.light.exists != 0 {
+        if self.coats.exists & !self.coats.apart & self.light.exists != 0 {
             let Block { points, coats, light, value, pdf, .. } = self;
             let surface = &points.surface;
             CoatLight { surface, coats, tables: &COATS, direction: &light.direction }.compute(
@@ -53,6 +55,14 @@ impl Block<'_> {
             let Block { points, rough, light, value, pdf, .. } = self;
             Rough { surface: &points.surface, rough }.light(context.level, &light.direction, value, pdf);
         }
+    }
+
+    /// Evaluates and weighs the light samples of coats apart from their bases, after [`Block::light`].
+    #[inline]
+    pub(in crate::transport) fn weigh_apart(&mut self, level: Level) {
+        let Block { points, coats, light, each, throughput, apart, supplied, .. } = self;
+        let (surface, tables, supplied) = (&points.surface, &COATS, *supplied);
+        ApartLight { surface, coats, tables, light, each, throughput, supplied }.compute(level, apart);
     }
 
     /// Chooses and samples the lights of the vertices in `lit`.

@@ -8,6 +8,7 @@ use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
 use glam::Vec3;
 use halflight_simd::kernels::shade::coat::CoatSamples;
+use halflight_simd::kernels::shade::coat_apart::ApartSamples;
 use halflight_simd::kernels::shade::numbers::Offsets;
 use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::scatter::Scatter;
@@ -23,6 +24,8 @@ pub(in crate::transport) struct Sets {
     /// Paths that are too long.
     pub(in crate::transport) cut: u32,
     pub(in crate::transport) delta: u32,
+    /// Samples of coats apart from their bases.
+    pub(in crate::transport) coat: u32,
     pub(in crate::transport) transmits: u32,
 }
 
@@ -72,10 +75,16 @@ impl Block<'_> {
             0 => [0.0; BLOCK],
             _ => self.samples.singles(level, offset),
         };
-        for i in Set(others) {
+        self.sample_by_lobes::<F>(level, &lobe, onward, sets);
+    }
+
+    /// [`Block::sample_given`] by known numbers of the lobes.
+    #[inline]
+    fn sample_by_lobes<F: Features>(&mut self, level: Level, lobe: &Row, onward: u32, sets: &mut Sets) {
+        for i in Set(onward & !self.in_lanes()) {
             self.sample_other::<F>(i, lobe[i], sets);
         }
-        self.sample_lobes(level, &lobe, onward, sets);
+        self.sample_lobes(level, lobe, onward, sets);
     }
 
     /// Samples the BSDF of vertex `i`, which lanes do not sample.
@@ -101,11 +110,18 @@ impl Block<'_> {
     fn sample_lobes(&mut self, level: Level, lobe: &Row, onward: u32, sets: &mut Sets) {
         let Block { points, coats, specular, rough, numbers, given, .. } = self;
         let surface = &points.surface;
-        if coats.exists & onward != 0 {
+        if coats.exists & !coats.apart & onward != 0 {
             let samples = CoatSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
             let [exists, delta] = samples.compute(level, given);
-            sets.active &= exists | !coats.exists;
-            sets.delta |= delta;
+            sets.active &= exists | !coats.exists | coats.apart;
+            sets.delta |= delta & !coats.apart;
+        }
+        if coats.apart & onward != 0 {
+            let samples = ApartSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
+            let of_lobes = samples.compute(level, given);
+            sets.active &= of_lobes.exists | !coats.apart;
+            sets.delta |= of_lobes.delta;
+            sets.coat = of_lobes.coat;
         }
         if rough.exists & onward != 0 {
             let exists = Rough { surface, rough }.sample(level, (&numbers.scatter, lobe), given);
@@ -142,9 +158,32 @@ impl Block<'_> {
         self.samples.scattering(level, offsets, &mut self.numbers);
         let mut sets = Sets { active: onward, ..Sets::default() };
         self.sample_given::<F>(level, lobe, onward, &mut sets);
+        self.sample_all(level, &mut sets);
+        sets
+    }
+
+    /// Samples the BSDFs of the vertices `onward` by the numbers of the block and those of the lobes. They go
+    /// into the given samples.
+    #[inline]
+    pub(in crate::transport) fn sample_by_numbers<F: Features>(
+        &mut self,
+        level: Level,
+        lobe: &Row,
+        onward: u32,
+    ) -> Sets {
+        let mut sets = Sets { active: onward, ..Sets::default() };
+        self.given.eta = [1.0; BLOCK];
+        self.sample_by_lobes::<F>(level, lobe, onward, &mut sets);
+        self.sample_all(level, &mut sets);
+        sets
+    }
+
+    /// Adds the samples of the BSDFs that [`Scatter`] samples to those given.
+    #[inline]
+    pub(in crate::transport) fn sample_all(&mut self, level: Level, sets: &mut Sets) {
         let Block { points, bsdf, given, numbers, most, throughput, factor, eta_squared, .. } = &*self;
         let (surface, u, roulette) = (&points.surface, &numbers.scatter, &numbers.roulette);
-        let Sets { active, certain, .. } = sets;
+        let Sets { active, certain, .. } = *sets;
         let scatter = Scatter {
             surface,
             bsdf,
@@ -159,7 +198,6 @@ impl Block<'_> {
             certain,
         };
         (self.given, sets.active) = scatter.samples(level);
-        sets
     }
 
     /// The given sample of vertex `i`, with the `sets` of its block. The density of a delta lobe is infinite.

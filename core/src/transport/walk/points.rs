@@ -263,21 +263,3 @@ impl Set {
         set
     }
 }
-
-impl<'a, F: Features> SceneContext<'a, F> {
-    /// Hit `i` of `rays`, for one `i` after the other from 0 on. The first of a block computes the points of
-    /// all, so that the rays up to `i` may be replaced.
-    #[inline]
-    pub(in crate::transport) fn met<'p>(
-        &self,
-        points: &'p mut PointBlock<'a>,
-        (rays, hits): (&[Ray], &[Hit]),
-        i: usize,
-    ) -> Met<'p, 'a> {
-        if i.is_multiple_of(BLOCK) {
-            let end = rays.len().min(i + BLOCK);
-            points.meet(self, (&rays[i..end], &hits[i..end]));
-        }
-        points.at(i)
-    }
-}

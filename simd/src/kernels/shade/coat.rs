@@ -41,8 +41,12 @@ pub struct CoatBlock {
     pub eta: Row,
     /// Mean transmittances for uniform light from the bases.
     pub mean: Row3,
+    /// Weights of the bases in the choice of the lobe.
+    pub base_weight: Row,
     /// Bit `i`: surface `i` has a coat.
     pub exists: u32,
+    /// Bit `i`: it is sampled and weighted apart from its base (`coat_apart.rs`).
+    pub apart: u32,
     /// Bit `i`: its coat is a dielectric. Others are coats of Schlick.
     pub dielectric: u32,
     /// Transmittances T(θ_o), by [`CoatBlock::see`].
@@ -61,7 +65,9 @@ impl CoatBlock {
         alpha: [0.0; 16],
         eta: [1.5; 16],
         mean: [[0.0; 16]; 3],
+        base_weight: [1.0; 16],
         exists: 0,
+        apart: 0,
         dielectric: 0,
         transmittance: [[0.0; 16]; 3],
         probability: [0.0; 16],
@@ -69,23 +75,24 @@ impl CoatBlock {
 }
 
 /// Coats over lanes.
-struct CoatLanes<L: Lanes> {
-    base: [L; 3],
+pub(super) struct CoatLanes<L: Lanes> {
+    pub(super) base: [L; 3],
     tint: [L; 3],
     metal: [L; 3],
     metallic: L,
-    alpha: L,
+    pub(super) alpha: L,
     eta: L,
     mean: [L; 3],
-    exists: L::Mask,
+    base_weight: L,
+    pub(super) exists: L::Mask,
     dielectric: L::Mask,
-    transmittance: [L; 3],
-    probability: L,
+    pub(super) transmittance: [L; 3],
+    pub(super) probability: L,
 }
 
 impl<L: Lanes> CoatLanes<L> {
     #[inline(always)]
-    fn rough(&self) -> L::Mask {
+    pub(super) fn rough(&self) -> L::Mask {
         !self.alpha.eq(self.alpha.all(0.0))
     }
 
@@ -99,7 +106,7 @@ impl<L: Lanes> CoatLanes<L> {
 
     /// Reflectance of a microfacet at the cosine `c`.
     #[inline(always)]
-    fn reflectance(&self, c: L) -> [L; 3] {
+    pub(super) fn reflectance(&self, c: L) -> [L; 3] {
         self.mix(fresnel(c, self.eta), schlick_weight(c))
     }
 
@@ -112,7 +119,7 @@ impl<L: Lanes> CoatLanes<L> {
     /// Transmittance at the cosine `c`, and the albedos of coats of Schlick for F = 1 and F = (1 - c)^5. The
     /// albedos of dielectric coats are computed if `all`.
     #[inline(always)]
-    fn transmittance(&self, tables: &CoatTables, c: L, all: bool) -> ([L; 3], [L; 2]) {
+    pub(super) fn transmittance(&self, tables: &CoatTables, c: L, all: bool) -> ([L; 3], [L; 2]) {
         let (one, step) = (c.all(1.0), c.all(STEP));
         let amplitudes = c.all(AMPLITUDES as f32);
         let (rough, smooth) = (self.rough(), one - fresnel(c, self.eta));
@@ -145,7 +152,7 @@ impl<L: Lanes> CoatLanes<L> {
         let of_schlick = Self::albedo(self.metal, [white, edge]);
         let albedo = vector::select(self.dielectric, of_dielectric, of_schlick);
         let coat = c.all(COAT_WEIGHT) * sum(albedo);
-        let base = sum(mul(mul(self.base, transmittance), self.mean));
+        let base = sum(mul(mul(self.base, transmittance), self.mean)) * self.base_weight;
         let probability = unit(coat / (coat + base)).select(zero.lt(base), one);
         (transmittance, probability)
     }
@@ -203,17 +210,17 @@ impl<L: Lanes> CoatLanes<L> {
 }
 
 /// Samples over lanes.
-struct SampleLanes<L: Lanes> {
-    direction: [L; 3],
-    weight: [L; 3],
-    pdf: L,
-    exists: L::Mask,
-    delta: L::Mask,
+pub(super) struct SampleLanes<L: Lanes> {
+    pub(super) direction: [L; 3],
+    pub(super) weight: [L; 3],
+    pub(super) pdf: L,
+    pub(super) exists: L::Mask,
+    pub(super) delta: L::Mask,
 }
 
 /// Coats of a block over lanes.
 #[inline(always)]
-fn coats<F: Load>(from: F, coats: &CoatBlock) -> CoatLanes<F::Lanes> {
+pub(super) fn coats<F: Load>(from: F, coats: &CoatBlock) -> CoatLanes<F::Lanes> {
     CoatLanes {
         base: from.row3(&coats.base),
         tint: from.row3(&coats.tint),
@@ -222,6 +229,7 @@ fn coats<F: Load>(from: F, coats: &CoatBlock) -> CoatLanes<F::Lanes> {
         alpha: from.row(&coats.alpha),
         eta: from.row(&coats.eta),
         mean: from.row3(&coats.mean),
+        base_weight: from.row(&coats.base_weight),
         exists: from.set(coats.exists),
         dielectric: from.set(coats.dielectric),
         transmittance: from.row3(&coats.transmittance),

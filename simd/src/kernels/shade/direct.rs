@@ -89,16 +89,43 @@ impl ShadowBlock {
 }
 
 /// Light samples over lanes.
-struct LightLanes<L: Lanes> {
-    direction: [L; 3],
+pub(super) struct LightLanes<L: Lanes> {
+    pub(super) direction: [L; 3],
     end: [L; 3],
-    pdf: L,
-    radiance: [L; 3],
+    pub(super) pdf: L,
+    pub(super) radiance: [L; 3],
     exists: L::Mask,
     bounded: L::Mask,
     area: L::Mask,
     alone: L::Mask,
     balance: L::Mask,
+}
+
+impl<L: Lanes> LightLanes<L> {
+    /// Light samples of a block.
+    #[inline(always)]
+    pub(super) fn of<F: Load<Lanes = L>>(from: F, light: &LightBlock) -> Self {
+        Self {
+            direction: from.row3(&light.direction),
+            end: from.row3(&light.end),
+            pdf: from.row(&light.pdf),
+            radiance: from.row3(&light.radiance),
+            exists: from.set(light.exists),
+            bounded: from.set(light.bounded),
+            area: from.set(light.area),
+            alone: from.set(light.alone),
+            balance: from.set(light.balance),
+        }
+    }
+
+    /// Weights against BSDF sampling of `density`, times the shares `each` of the samples.
+    #[inline(always)]
+    pub(super) fn weight(&self, each: L, density: L) -> L {
+        let one = density.all(1.0);
+        let ratio = each * density / self.pdf;
+        let weight = each * (one / (one + ratio.select(self.balance, ratio * ratio)));
+        each.select(self.alone, weight)
+    }
 }
 
 /// Shadow rays over lanes.
@@ -155,10 +182,7 @@ fn direct<L: Lanes>(
     each: L,
 ) -> ShadowLanes<L> {
     let (rays, density) = reach(vertex, light, given);
-    let one = density.all(1.0);
-    let ratio = each * density / light.pdf;
-    let weight = each * (one / (one + ratio.select(light.balance, ratio * ratio)));
-    let weight = each.select(light.alone, weight);
+    let weight = light.weight(each, density);
     let value = mul(mul(vertex.throughput, rays.contribution), light.radiance);
     ShadowLanes { contribution: scale(value, weight / light.pdf), ..rays }
 }
@@ -167,17 +191,7 @@ impl Direct<'_> {
     /// Shadow rays over lanes, with their contributions, or with f |cos| and the density if `REACH`.
     #[inline(always)]
     fn at<F: Load, const REACH: bool>(&self, from: F) -> (ShadowLanes<F::Lanes>, F::Lanes) {
-        let light = LightLanes {
-            direction: from.row3(&self.light.direction),
-            end: from.row3(&self.light.end),
-            pdf: from.row(&self.light.pdf),
-            radiance: from.row3(&self.light.radiance),
-            exists: from.set(self.light.exists),
-            bounded: from.set(self.light.bounded),
-            area: from.set(self.light.area),
-            alone: from.set(self.light.alone),
-            balance: from.set(self.light.balance),
-        };
+        let light = LightLanes::of(from, self.light);
         let vertex = vertices(from, self.surface, self.bsdf, self.throughput);
         let (given, each) = ((from.row3(self.value), from.row(self.pdf)), from.row(self.each));
         match REACH {

@@ -8,6 +8,7 @@ pub mod bsdf;
 pub mod camera;
 pub mod choice;
 pub mod coat;
+pub mod coat_apart;
 pub mod coat_tables;
 pub mod direct;
 pub mod emitter;

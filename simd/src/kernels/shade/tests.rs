@@ -3,6 +3,7 @@
 use super::bsdf::BsdfBlock;
 use super::camera::CameraRays;
 use super::coat::{CoatBlock, CoatLight, CoatSamples};
+use super::coat_apart::{ApartBlock, ApartLight, ApartSamples, ApartSets};
 use super::coat_tables::CoatTables;
 use super::direct::{Direct, LightBlock, ShadowBlock};
 use super::emitter::{EmitterBlock, EmitterSamples};
@@ -269,7 +270,9 @@ fn coats(random: &mut Random) -> CoatBlock {
         alpha: random.row(-0.3, 1.0).map(|alpha| if alpha < 1e-4 { 0.0 } else { alpha }),
         eta: random.row(1.0, 12.0),
         mean: [random.row(0.0, 1.0), random.row(0.0, 1.0), random.row(0.0, 1.0)],
+        base_weight: random.row(-0.5, 1.0).map(|weight| weight.max(0.0)),
         exists,
+        apart: exists & random.bits(),
         dielectric: exists & random.bits(),
         ..CoatBlock::EMPTY
     };
@@ -347,6 +350,56 @@ fn coats_agree_with_the_reference_on_every_level() {
             let found_sets = samples.compute(level, &mut found);
             assert_eq!(found_sets.map(|bits| bits & set), sets.map(|bits| bits & set), "{level:?}");
             check_samples(&found, &wanted, &before, [sets[0] & set, coats.exists]);
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 200), "{counts:?}");
+}
+
+#[test]
+fn coats_apart_agree_with_the_reference_on_every_level() {
+    let mut random = Random(15);
+    let mut tables: CoatTables = [[[0; 16]; 12]; 11];
+    for value in tables.as_flattened_mut().as_flattened_mut() {
+        *value = (random.next() * 4000.0) as i16 - 2000;
+    }
+    let mut counts = [0; 4];
+    for _ in 0..400 {
+        let (surface, mut coats) = (seen(&mut random), coats(&mut random));
+        coats.see_reference(&surface, &tables);
+        let light = LightBlock {
+            direction: random.directions(),
+            pdf: random.row(0.01, 2.0),
+            radiance: random.vectors(),
+            alone: random.bits(),
+            balance: random.bits(),
+            ..LightBlock::EMPTY
+        };
+        let (each, throughput, before) = (random.row(0.1, 1.0), random.vectors(), given(&mut random));
+        let (u, lobe) = ([random.row(0.0, 1.0), random.row(0.0, 1.0)], random.row(0.0, 1.0));
+        let (surface, coats, tables, supplied) = (&surface, &coats, &tables, random.bits());
+        let (each, throughput) = (&each, &throughput);
+        let light = ApartLight { surface, coats, tables, light: &light, each, throughput, supplied };
+        let samples = ApartSamples { surface, coats, tables, u: &u, lobe: &lobe };
+        let (mut lit, mut wanted) = (ApartBlock::EMPTY, before.clone());
+        light.reference(&mut lit);
+        let sets = samples.reference(&mut wanted);
+        let set = coats.apart & surface.regular;
+        counts[0] += lanes(set).filter(|&i| lit.contribution[0][i] != 0.0).count();
+        for (count, set) in counts[1..].iter_mut().zip([sets.exists, sets.delta, sets.coat & !sets.delta]) {
+            *count += (set & surface.regular).count_ones() as usize;
+        }
+        for level in Level::detect().and_below() {
+            let mut found = ApartBlock::EMPTY;
+            light.compute(level, &mut found);
+            for i in lanes(set) {
+                let all = |of: &ApartBlock| [&of.value, &of.contribution, &of.base].map(|row| bits3(row, i));
+                assert_eq!(all(&found), all(&lit), "{level:?} {i}");
+            }
+            let mut found = before.clone();
+            let found_sets = samples.compute(level, &mut found);
+            let all = |sets: &ApartSets| [sets.exists, sets.delta, sets.coat].map(|bits| bits & set);
+            assert_eq!(all(&found_sets), all(&sets), "{level:?}");
+            check_samples(&found, &wanted, &before, [sets.exists & set, coats.apart]);
         }
     }
     assert!(counts.iter().all(|&count| count > 200), "{counts:?}");

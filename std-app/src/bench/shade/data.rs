@@ -42,6 +42,8 @@ pub(super) const KERNELS: &[Kernel] = &[
     Kernel { name: "viewers of coats", run: |blocks, i, level| blocks.0[i].see(level) },
     Kernel { name: "light on coats", run: |blocks, i, level| blocks.0[i].light_coats(level) },
     Kernel { name: "samples of coats", run: |blocks, i, level| blocks.0[i].sample_coats(level) },
+    Kernel { name: "light on coats apart", run: |blocks, i, level| blocks.0[i].light_apart(level) },
+    Kernel { name: "samples of coats apart", run: |blocks, i, level| blocks.0[i].sample_apart(level) },
     Kernel { name: "samples of dielectrics", run: |blocks, i, level| blocks.0[i].refract(level) },
     Kernel { name: "light on rough glass", run: |blocks, i, level| blocks.0[i].light_rough(level) },
     Kernel { name: "samples of rough glass", run: |blocks, i, level| blocks.0[i].sample_rough(level) },
@@ -154,6 +156,7 @@ impl Block {
             mean: [[0.9; 16]; 3],
             alpha,
             exists: 0xffff,
+            apart: 0xffff,
             dielectric: 0xffff,
             ..CoatBlock::EMPTY
         };

@@ -1,7 +1,6 @@
 //! Next-event estimation at the vertices of a block: choice and samples of lights, and their shadow rays.
 
 use super::Estimated;
-use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::Ray;
 use crate::sampling::Sampler;
@@ -14,8 +13,8 @@ use crate::transport::walk::dimension;
 use crate::transport::walk::points::Set;
 use crate::transport::wavefront::{TO_ENVIRONMENT, Wavefront};
 use bytemuck::Zeroable;
-use halflight_simd::kernels::shade::at;
 use halflight_simd::kernels::shade::direct::Direct;
+use halflight_simd::kernels::shade::{at, put};
 
 impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// Takes light samples at the vertices of `lit` and queues their shadow rays.
@@ -68,19 +67,28 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         block.light(&self.context, lit);
         if !E::ADDS_NOTHING {
             for i in Set(block.light.exists) {
-                let ends = estimated.at(i).is_some_and(|(_, rest)| rest.ends);
+                let ends = estimated.at(i).is_some_and(|(vertex, rest)| rest.ends && !vertex.apart);
                 block.light.alone |= u32::from(ends) << i;
             }
+        }
+        let apart = if E::ADDS_NOTHING { 0 } else { block.coats.apart & block.light.exists };
+        if apart != 0 {
+            block.weigh_apart(self.context.level);
+            Set(apart).for_each(|i| put(&mut block.value, i, at(&block.apart.value, i)));
         }
         let Block { points, bsdf, light, value, pdf, each, throughput, shadows, .. } = &mut *block;
         let surface = &points.surface;
         Direct { surface, bsdf, light, value, pdf, each, throughput }.compute(self.context.level, shadows);
         let mut none = (E::State::zeroed(), R::State::zeroed());
         for i in Set(block.shadows.exists) {
+            let is_apart = apart >> i & 1 == 1;
             if R::IN_CIRCLES && block.has_others() >> i & 1 == 1 {
                 let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
                 let Some(Path { shared, .. }) = path else { continue };
                 R::sample_light(shared, || {
+                    if is_apart {
+                        return at(&block.apart.base, i).into();
+                    }
                     let wi = block.points.point(i).frame.to_local(at(&block.light.direction, i).into());
                     let (wo, f) = (at(&block.points.surface.wo, i).into(), at(&block.value, i).into());
                     block.others[i].base_part(wo, wi, f)
@@ -89,8 +97,9 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let is_later = block.environment >> i & 1 == 1;
             let tag = block.path[i] | if is_later { TO_ENVIRONMENT } else { 0 };
             let [r, g, b, _] = block.shadows.contribution[i];
+            let light = if is_apart { at(&block.apart.contribution, i) } else { [r, g, b] };
             let ray: Ray = bytemuck::cast(block.shadows.rays[i]);
-            wave.push_shadow_ray(Ray { tag, ..ray }, Rgb::new(r, g, b));
+            wave.push_shadow_ray(Ray { tag, ..ray }, light.into());
         }
     }
 

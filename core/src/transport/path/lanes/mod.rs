@@ -152,21 +152,22 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 continue;
             }
             put(&mut block.throughput, i, path.path.throughput);
-            let one = 1 << i;
+            let (one, mut apart) = (1 << i, None);
             if E::ADDS_NOTHING {
                 path.path.classes = path.path.classes.behind(&bsdf);
             } else if let Some(point) = &points.points[i] {
                 let found = points.found[i];
                 let vertex = self.vertex(path.path, (&ray, point), (bsdf, &found));
                 let rest = self.known(path, &vertex, found);
-                let is_single = vertex.apart || self.estimator.weighs_samples(&bsdf);
+                let is_single = self.estimator.weighs_samples(&bsdf);
+                apart = vertex.apart.then_some((rest.base_weight, rest.is_lit));
                 (block.light_samples[i], block.each[i]) =
                     (rest.light_samples, 1.0 / rest.light_samples as f32);
                 if is_single {
                     stages.single |= one;
                 } else {
-                    stages.onward |= if rest.ends { 0 } else { one };
-                    stages.lit |= if rest.is_lit { 0 } else { one };
+                    stages.onward |= if rest.ends && !vertex.apart { 0 } else { one };
+                    stages.lit |= if rest.is_lit && !vertex.apart { 0 } else { one };
                 }
                 estimated.vertices[i] = Some((vertex, rest));
                 if is_single {
@@ -175,6 +176,9 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             }
             stages.met |= one;
             block.put_bsdf::<F>(i, &bsdf, block.segments[i]);
+            if let Some((base_weight, is_supplied)) = apart {
+                block.separate_coat(i, base_weight, is_supplied);
+            }
         }
         if block.coats.exists != 0 {
             block.coats.see(self.context.level, &block.points.surface, &COATS);

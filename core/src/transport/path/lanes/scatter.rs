@@ -31,6 +31,11 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         }
         let level = self.context.level;
         let mut sets = block.sample_bsdfs::<F>(level, onward);
+        if !E::ADDS_NOTHING {
+            // A coat over a cached base is dark, but all noise of the pixel is its own.
+            let dark = |i: &usize| block.segments[*i] == 1 && block.coats.base_weight[*i] < 1.0;
+            sets.certain |= Set(sets.coat).filter(dark).fold(0, |set, i| set | 1 << i);
+        }
         if R::IN_CIRCLES {
             self.leave((block, memory), wave, &mut sets);
         }
@@ -52,8 +57,10 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let path = memory.path(wave.paths, block.path[i] as usize, &mut none);
             let Some(Path { shared, .. }) = path else { continue };
             if block.has_others() >> i & 1 == 1 {
-                R::sample_bsdf(shared, || match sets.delta >> i & 1 == 1 {
+                let bit = |set: u32| set >> i & 1 == 1;
+                R::sample_bsdf(shared, || match bit(sets.delta | sets.coat) {
                     true => Rgb::ZERO,
+                    false if bit(block.coats.apart) => Rgb::ONE,
                     false => {
                         let f = Rgb::from(at(&block.given.weight, i)) * block.given.pdf[i];
                         let wi = at(&block.given.direction, i).into();
@@ -91,7 +98,8 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let (is_delta, transmits) = (sets.delta >> i & 1 == 1, sets.transmits >> i & 1 == 1);
             if !E::ADDS_NOTHING {
                 let Some((vertex, rest)) = estimated.at(i) else { continue };
-                let classes = if is_delta { Some(rest.narrow) } else { rest.wide };
+                let is_coat = is_delta || sets.coat >> i & 1 == 1;
+                let classes = if is_coat { Some(rest.narrow) } else { rest.wide };
                 let Some(classes) = classes else { continue };
                 path.classes = classes;
                 if sets.cut >> i & 1 == 0 {
@@ -103,7 +111,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                         transmitted: transmits,
                         eta: block.given.eta[i],
                     };
-                    self.estimator.scattered(&self.context, vertex, state, (&sample, is_delta));
+                    self.estimator.scattered(&self.context, vertex, state, (&sample, is_coat));
                     path.travelled = vertex.travelled;
                     // MIS compares one BSDF sample with n light samples.
                     pdf /= rest.light_samples as f32;
