@@ -19,9 +19,9 @@ use crate::transport::{CausticMerging, LightEstimator, PathIntegrator, RadiusSch
 const FEWEST_PATHS: usize = 16 * PATHS_PER_TASK;
 const MOST_PATHS: usize = 4096 * PATHS_PER_TASK;
 
-/// Fraction of the work of a picture for its first maps, and their number: of the first samples of paths; beside
-/// records a pair for samples, one for records of irradiance and one for view-bound records. And rays whose
-/// time a light path takes, with its photons in a map.
+/// Fraction of the work of a picture for its first maps, and their number: of the first samples of paths;
+/// beside records a pair for samples, one for records of irradiance and one for view-bound records. And rays
+/// whose time a light path takes, with its photons in a map.
 const FIRST_SHARE: f64 = 0.2;
 const FIRST_MAPS: f64 = 4.0;
 const FIRST_MAPS_BESIDE_RECORDS: f64 = 6.0;
