@@ -9,6 +9,7 @@
 pub mod bootstrap;
 pub mod chain;
 mod join;
+mod lane;
 pub mod lanes;
 pub(in crate::transport) mod numbers;
 pub mod paths;

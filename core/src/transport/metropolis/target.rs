@@ -4,6 +4,7 @@
 //! which a random number chooses. Its light is the weighted contribution of the technique times the number of
 //! techniques. A point of PSSMLT (Kelemen et al. 2002) is a whole path of path tracing.
 
+use super::lane::Lane;
 use super::lanes::{LANES, Lanes};
 use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail};
 use super::numbers::{VertexNumbers, slots_of_technique};
@@ -65,14 +66,6 @@ pub struct Target<'a, F> {
     paths: Paths<'a, F>,
     pub(super) split: Split<'a>,
     pub(super) space: PrimarySpace,
-}
-
-/// A technique of one lane.
-struct Lane<'p> {
-    number: usize,
-    segments: u32,
-    technique: Technique,
-    point: Point<'p>,
 }
 
 impl<'a, F: Features> Target<'a, F> {
@@ -197,13 +190,7 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
-        let numbers = |lanes: &Lanes, tag: u32| {
-            let (Lane { technique, segments, point, .. }, subpath) =
-                (lane(tag as usize), lanes.lights.get(tag as usize)?);
-            let goes_on = subpath.segments < technique.subpaths(segments)[0];
-            let scattering = Some(point.scattering(subpath.segments, true));
-            goes_on.then_some((subpath.segments, VertexNumbers::Given { light: None, scattering }))
-        };
+        let numbers = |lanes: &Lanes, tag: u32| lane(tag as usize).of_light(lanes);
         self.advance((lanes, active), counters, numbers, |lanes, end, counters| {
             let lane = lane(end.0.tag as usize);
             self.light_step(&lane, lanes, end, &mut values[lane.number], counters)
@@ -298,21 +285,7 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
-        let numbers = |lanes: &Lanes, tag: u32| {
-            let (Lane { technique, segments, point, .. }, subpath) =
-                (lane(tag as usize), lanes.cameras.get(tag as usize)?);
-            let numbers = match technique {
-                _ if subpath.segments < technique.subpaths(segments)[1] => VertexNumbers::Given {
-                    light: None,
-                    scattering: Some(point.scattering(subpath.segments, false)),
-                },
-                Technique::LightSample => {
-                    VertexNumbers::Given { light: Some(point.light_sample()), scattering: None }
-                }
-                _ => return None,
-            };
-            Some((subpath.segments, numbers))
-        };
+        let numbers = |lanes: &Lanes, tag: u32| lane(tag as usize).of_camera(lanes);
         self.advance((lanes, active), counters, numbers, |lanes, end, counters| {
             let lane = lane(end.0.tag as usize);
             self.camera_step(&lane, lanes, end, &mut values[lane.number], counters)

@@ -309,15 +309,15 @@ mod tests {
         (block.light.pdf, block.light.alone) = ([1.0; BLOCK], 0xffff);
         for round in 0..200 {
             block.clear_bsdfs();
-            let mut lobe = [0.0; BLOCK];
-            for i in 0..BLOCK {
+            let mut lobes = [0.0; BLOCK];
+            for (i, lobe) in lobes.iter_mut().enumerate() {
                 let n = 16 * round + i as u32;
                 let number = |k: u32| random.single(20 * n + k);
                 let wo = uniform_sphere([number(6), number(7)]);
                 put(&mut block.points.surface.wo, i, [wo.x, wo.y, wo.z.abs()]);
                 put(&mut block.light.direction, i, uniform_sphere([number(8), number(9)]).to_array());
                 (block.numbers.scatter[0][i], block.numbers.scatter[1][i]) = (number(10), number(11));
-                lobe[i] = number(12);
+                *lobe = number(12);
                 block.put_bsdf::<All>(i, &surfaces(&random, n), 1);
                 block.separate_coat(i, [0.0, 0.3, 1.0][n as usize % 3], n.is_multiple_of(4));
             }
@@ -325,7 +325,7 @@ mod tests {
             block.weigh_apart(level);
             let Block { points, coats, given, numbers, .. } = &mut block;
             let (surface, u) = (&points.surface, &numbers.scatter);
-            let samples = ApartSamples { surface, coats, tables: &COATS, u, lobe: &lobe };
+            let samples = ApartSamples { surface, coats, tables: &COATS, u, lobe: &lobes };
             let sets = samples.compute(level, given);
             for i in Set(block.coats.apart) {
                 let (bsdf, weight) = (&block.others[i], block.coats.base_weight[i]);
@@ -334,7 +334,7 @@ mod tests {
                 let base = if block.supplied >> i & 1 == 1 { Rgb::ZERO } else { base };
                 assert_eq!(Rgb::from(at(&block.apart.value, i)), base + coat, "{bsdf:?}");
                 assert_eq!(Rgb::from(at(&block.apart.contribution, i)), base + coat, "{bsdf:?}");
-                let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobe[i]];
+                let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobes[i]];
                 let sample = bsdf.sample_apart::<All>(wo.into(), u, weight);
                 assert_eq!(sets.exists >> i & 1 == 1, sample.is_some(), "{bsdf:?}");
                 let Some((sample, is_coat)) = sample else { continue };

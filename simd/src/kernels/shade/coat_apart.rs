@@ -1,6 +1,6 @@
-//! Coats apart from their bases at the vertices of a block, over lanes, where a data structure supplies light of
-//! the bases: a sample is of the base or of the coat alone, and light samples of each are weighted against its
-//! own density, with the operations of the scalar BSDFs in their order.
+//! Coats apart from their bases at the vertices of a block, over lanes, where a data structure supplies
+//! light of the bases: a sample is of the base or of the coat alone, and light samples of each are weighted
+//! against its own density, with the operations of the scalar BSDFs in their order.
 
 use super::bsdf::{frame, to_local, viewer};
 use super::coat::{CoatBlock, CoatLanes, SampleLanes, coats};
@@ -20,8 +20,8 @@ use core::f32::consts::FRAC_1_PI;
 type Lobe<L> = ([L; 3], L);
 
 impl<L: Lanes> CoatLanes<L> {
-    /// Base and coat, each alone, with the probabilities of their choice; zeros for smooth coats and below the
-    /// horizon.
+    /// Base and coat, each alone, with the probabilities of their choice; zeros for smooth coats and below
+    /// the horizon.
     #[inline(always)]
     fn evaluate_apart(&self, tables: &CoatTables, wo: [L; 3], wi: [L; 3]) -> [Lobe<L>; 2] {
         let (zero, one) = (wi[2].all(0.0), wi[2].all(1.0));
@@ -141,7 +141,8 @@ impl ApartLight<'_> {
         level.dispatch(LightKernel(self, out));
     }
 
-    /// Scalar reference; equals [`ApartLight::compute`] to the bit in lanes of coats apart with light samples.
+    /// Scalar reference; equals [`ApartLight::compute`] to the bit in lanes of coats apart with light
+    /// samples.
     pub fn reference(&self, out: &mut ApartBlock) {
         for i in 0..super::BLOCK {
             let [value, contribution, base] = self.at(One(i));
