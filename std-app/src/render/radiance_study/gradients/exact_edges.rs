@@ -8,7 +8,7 @@
 //!   ∮ (u - v)² z Z_k Sym(ν ⊗ ∇B) ds,
 //!
 //! ν the normal of the silhouette. In these rooms B jumps, by ΔB across an edge with the normal ν_B, and is
-//! constant elsewhere: a junction, where the edge ends behind the silhouette at the angle χ, has the share
+//! constant elsewhere: a junction, where the edge ends behind the silhouette at the angle χ, adds
 //!
 //!   (u - v)² z Z_k ΔB Sym(ν ⊗ ν_B)/|sin χ|.
 
@@ -74,16 +74,16 @@ fn hessians(room: &Room, from: DVec2) -> [Hessians; 2] {
             let w = next.0.normalize();
             let [first, second] = [edge, next].map(|(a, b)| a.cross(b).normalize());
             let apart = inverse_distance(square, w) - inverse_distance(corners, w);
-            let share = radiance * apart * apart * w.z / first.cross(second).length();
+            let factor = radiance * apart * apart * w.z / first.cross(second).length();
             for (sum, (value, _)) in by_junctions.iter_mut().zip(functions(w)) {
-                add_symmetric(sum, share * value, first.xy(), second.xy());
+                add_symmetric(sum, factor * value, first.xy(), second.xy());
             }
         }
     }
     sums
 }
 
-/// Edges alone are wrong by a fifth and more at half of the receivers below the square, whatever the number
+/// Edges alone are wrong by a fifth and more at many receivers below the square, whatever the number
 /// of strata; with junctions they are exact.
 #[test]
 fn exact_edges_and_junctions_give_the_hessians_of_all_coefficients() {
@@ -116,11 +116,9 @@ fn exact_edges_and_junctions_give_the_hessians_of_all_coefficients() {
             assert!(with < EXACT, "{} {from}: {without} without, {with} with junctions", room.name);
             wrong += usize::from(without >= 0.2);
         }
-        println!(
-            "{}: {wrong} of {RECEIVERS}, {:.3?}",
-            room.name,
-            all.map(|group| group.map(Squares::relative))
-        );
+        let without = all.map(|group| group[0].relative());
+        let is_wrong = without.iter().all(|error| *error > 0.3);
+        assert!(is_wrong == room.is_occluded, "{}: {without:?}", room.name);
         assert_eq!(wrong > 0, room.is_occluded, "{}", room.name);
     }
 }
