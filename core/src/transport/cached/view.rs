@@ -27,8 +27,8 @@ use glam::Vec3;
 /// Strata along a side of the lobe of a record.
 pub const SIDE: usize = 16;
 
-/// Alpha of the lobes that view-bound records serve, from 0.05 but for rounding.
-const ALPHAS: core::ops::RangeInclusive<f32> = 0.049..=0.25;
+/// Alpha of the lobes that view-bound records serve where coefficients do not, from 0.05 but for rounding.
+const ALPHAS: core::ops::RangeInclusive<f32> = 0.049..=0.5;
 
 /// Smallest cosine of a viewer to the normal.
 const LEAST_COSINE: f32 = 0.05;

@@ -256,7 +256,7 @@ impl<'m, F: Features> Cached<'m, F> {
         let Some(views) = self.method.views() else {
             let reason = match view::may_serve(self.setup.scene) {
                 true => "not enough memory, or too short paths: narrow lobes are path traced",
-                false => "no surface has a narrow lobe, of alpha 0.05 to 0.25",
+                false => "no surface has a narrow lobe, of alpha 0.05 to 0.5",
             };
             return Finding::new(TOPIC, LeftOut, reason);
         };

@@ -96,19 +96,18 @@ impl Room {
         sum
     }
 
-    /// Exact derivatives of the coefficients by central differences: x, y, xx, xy, yy.
-    fn derivatives(&self, from: DVec2) -> [[f64; 5]; COUNT_MAX] {
-        const H: f64 = 1e-3;
-        let at = |i: i32, j: i32| self.coefficients(from + H * DVec2::new(f64::from(i), f64::from(j)));
+    /// Exact derivatives of the coefficients by central differences over `h`: x, y, xx, xy, yy.
+    fn derivatives(&self, from: DVec2, h: f64) -> [[f64; 5]; COUNT_MAX] {
+        let at = |i: i32, j: i32| self.coefficients(from + h * DVec2::new(f64::from(i), f64::from(j)));
         let [here, east, west, north, south] = [at(0, 0), at(1, 0), at(-1, 0), at(0, 1), at(0, -1)];
         let corners = [at(1, 1), at(1, -1), at(-1, 1), at(-1, -1)];
         core::array::from_fn(|k| {
             [
-                (east[k] - west[k]) / (2.0 * H),
-                (north[k] - south[k]) / (2.0 * H),
-                (east[k] - 2.0 * here[k] + west[k]) / (H * H),
-                (corners[0][k] - corners[1][k] - corners[2][k] + corners[3][k]) / (4.0 * H * H),
-                (north[k] - 2.0 * here[k] + south[k]) / (H * H),
+                (east[k] - west[k]) / (2.0 * h),
+                (north[k] - south[k]) / (2.0 * h),
+                (east[k] - 2.0 * here[k] + west[k]) / (h * h),
+                (corners[0][k] - corners[1][k] - corners[2][k] + corners[3][k]) / (4.0 * h * h),
+                (north[k] - 2.0 * here[k] + south[k]) / (h * h),
             ]
         })
     }
@@ -179,7 +178,7 @@ pub struct GradientError {
 const RECEIVERS: usize = 24;
 /// Degree of the representation.
 const DEGREE: usize = 6;
-/// Step of the finite displacement, in sides of the room.
+/// Step of the finite displacement and of differences, in sides of the room.
 const STEP: f32 = 1e-3;
 
 /// Sum of squared errors, and of squares of the truth.
@@ -218,7 +217,7 @@ pub(super) fn errors(room: &Room, strata: usize) -> Result<GradientError, OutOfM
     let (mut gradient, mut hessian, mut leaving) = <([Squares; 4], [Squares; 4], [Squares; 3])>::default();
     for _ in 0..RECEIVERS {
         let from = DVec2::new(0.1 + 0.8 * random.unit(), 0.1 + 0.8 * random.unit());
-        let truth = room.derivatives(from);
+        let truth = room.derivatives(from, STEP.into());
         let gather = Gather::new(room, from, strata, &mut random);
         let Some(hemisphere) = gather.hemisphere() else { continue };
         let Some(flux) = border_flux(Level::detect(), &tables, &hemisphere) else { continue };
@@ -261,6 +260,9 @@ pub(super) fn errors(room: &Room, strata: usize) -> Result<GradientError, OutOfM
 fn along(lobe: &[f32; COUNT_MAX], gradients: &Gradients, axis: usize) -> f64 {
     lobe.iter().zip(&gradients[0]).map(|(&c, gradient)| f64::from(c * gradient[axis])).sum()
 }
+
+#[cfg(test)]
+mod exact_edges;
 
 #[cfg(test)]
 mod tests {

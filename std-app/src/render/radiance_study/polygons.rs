@@ -9,7 +9,7 @@ use halflight_core::cache::radiance::zernike::{COUNT_MAX, DEGREE_MAX, index};
 use std::sync::LazyLock;
 
 /// Edges of a polygon.
-fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
+pub(super) fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
     polygon.iter().copied().zip(polygon.iter().copied().cycle().skip(1))
 }
 
@@ -84,19 +84,24 @@ const PIECES: usize = 6;
 /// clockwise count as negative.
 pub(super) fn add_coefficients(polygon: &[DVec3], radiance: f64, out: &mut [f64; COUNT_MAX]) {
     for (a, b) in edges(polygon) {
-        let (a, b) = (a.normalize(), b.normalize());
-        for piece in 0..PIECES {
-            for [node, weight] in GAUSS {
-                // w = chord/|chord|, and its derivative.
-                let chord = a.lerp(b, (piece as f64 + node) / PIECES as f64);
-                let length = chord.length();
-                let w = chord / length;
-                let slope = (b - a).reject_from_normalized(w) / length;
-                let area = radiance * weight / PIECES as f64 * (w.x * slope.y - w.y * slope.x);
-                add_point(w, area, out);
-            }
+        for (w, step) in nodes(a, b) {
+            add_point(w, radiance * (w.x * step.y - w.y * step.x), out);
         }
     }
+}
+
+/// Directions from `a` to `b` on their great circle, and the steps dw of an integral over it.
+pub(super) fn nodes(a: DVec3, b: DVec3) -> impl Iterator<Item = (DVec3, DVec3)> {
+    let (a, b) = (a.normalize(), b.normalize());
+    (0..PIECES).flat_map(move |piece| {
+        GAUSS.map(|[node, weight]| {
+            // w = chord/|chord|, and its derivative.
+            let chord = a.lerp(b, (piece as f64 + node) / PIECES as f64);
+            let length = chord.length();
+            let w = chord / length;
+            (w, weight / PIECES as f64 / length * (b - a).reject_from_normalized(w))
+        })
+    })
 }
 
 /// Adds G of all functions at the direction `w`, times `area`.
