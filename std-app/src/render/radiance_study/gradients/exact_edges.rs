@@ -99,15 +99,16 @@ fn exact_edges_and_junctions_give_the_hessians_of_all_coefficients() {
             let truth = room.derivatives(from, SHORT_STEP);
             let [by_edges, by_junctions] = hessians(room, from);
             let mut here = [Squares::default(); 2];
-            for k in 0..count(DEGREE) {
+            let functions = by_edges.iter().zip(&by_junctions).zip(&truth).take(count(DEGREE));
+            for (k, ((by_edges, by_junctions), truth)) in functions.enumerate() {
+                let group =
+                    (0..4).find(|group| (count(2 * group) - 2 * group - 1..count(2 * group)).contains(&k));
                 for (element, weight) in [1.0, 2.0, 1.0].into_iter().enumerate() {
-                    let (found, more) = (by_edges[k][element], by_junctions[k][element]);
-                    let group = (0..4)
-                        .find(|group| (count(2 * group) - 2 * group - 1..count(2 * group)).contains(&k));
+                    let (found, more) = (by_edges[element], by_junctions[element]);
                     for (with, found) in [found, found + more].into_iter().enumerate() {
-                        here[with].add(found, truth[k][2 + element], weight);
+                        here[with].add(found, truth[2 + element], weight);
                         if let Some(group) = group {
-                            all[group][with].add(found, truth[k][2 + element], weight);
+                            all[group][with].add(found, truth[2 + element], weight);
                         }
                     }
                 }
