@@ -7,7 +7,7 @@ use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
 use halflight_simd::kernels::shade::choice::{ChoiceBlock, Choices};
 use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
-use halflight_simd::kernels::shade::coat_apart::{ApartBlock, ApartLight, ApartSamples};
+use halflight_simd::kernels::shade::coat_apart::{ApartBlock, ApartLight};
 use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
@@ -335,14 +335,14 @@ fn check_apart(rows: &mut Rows, [alone, balance]: [u32; 2], surface: &SurfaceBlo
     let (each, throughput, u, lobe) = (rows.unit(), rows.vectors(), [rows.unit(), rows.unit()], rows.unit());
     let (each, throughput, supplied) = (&each, &throughput, balance);
     let light = ApartLight { surface, coats, tables, light: &light, each, throughput, supplied };
-    let samples = ApartSamples { surface, coats, tables, u: &u, lobe: &lobe };
+    let samples = CoatSamples { surface, coats, tables, u: &u, lobe: &lobe };
     let (mut lit, mut wanted) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
     light.reference(&mut lit);
-    let sets = samples.reference(&mut wanted);
+    let sets = samples.reference_apart(&mut wanted);
     for level in Level::detect().and_below() {
         let (mut found, mut out) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
         light.compute(level, &mut found);
-        assert_eq!(samples.compute(level, &mut out), sets, "{level:?}");
+        assert_eq!(samples.compute_apart(level, &mut out), sets, "{level:?}");
         check("value", coats.apart, &found.value, &lit.value);
         check("contribution", coats.apart, &found.contribution, &lit.contribution);
         check("part of the base", coats.apart, &found.base, &lit.base);

@@ -66,7 +66,6 @@ impl Glossy {
         put(&mut block.metal, i, self.f0.to_array());
         put(&mut block.mean, i, self.mean_transmittance().to_array());
         (block.metallic[i & 15], block.alpha[i & 15], block.eta[i & 15]) = (1.0, self.alpha, 1.5);
-        block.base_weight[i & 15] = 1.0;
         block.exists |= 1 << i;
     }
 

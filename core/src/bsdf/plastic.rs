@@ -83,7 +83,6 @@ impl Plastic {
         put(&mut block.mean, i, self.mean_transmittance().to_array());
         (block.metallic[i & 15], block.alpha[i & 15], block.eta[i & 15]) =
             (self.metallic, self.alpha, self.eta);
-        block.base_weight[i & 15] = 1.0;
         (block.exists, block.dielectric) = (block.exists | 1 << i, block.dielectric | 1 << i);
     }
 

@@ -9,7 +9,6 @@ use crate::transport::bidirectional::camera_paths::CameraPaths;
 use crate::transport::walk::block::Block;
 use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::points::Set;
-use halflight_simd::kernels::shade::direct::Direct;
 use halflight_simd::kernels::shade::put;
 
 impl<'a, F: Features> CameraPaths<'a, F> {
@@ -46,14 +45,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             block.coats.see(level, &block.points.surface, &COATS);
         }
         block.number(level, lights.has_many_lights());
-        block.shadows.exists = 0;
-        let lit = if lights.is_empty() { 0 } else { block.begin_light(onward) };
-        if lit != 0 {
-            block.light(context, lit);
-            let Block { points, bsdf, light, value, pdf, each, throughput, shadows, .. } = &mut *block;
-            let surface = &points.surface;
-            Direct { surface, bsdf, light, value, pdf, each, throughput }.reach(level, shadows);
-        }
+        block.reach_lights(context, onward);
         let sets = block.sample_bsdfs::<F>(level, onward);
         block.scatter(level, &sets);
         sets

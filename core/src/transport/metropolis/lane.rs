@@ -18,8 +18,10 @@ impl Lane<'_> {
     pub(super) fn of_light(&self, lanes: &Lanes) -> Option<(u32, VertexNumbers)> {
         let segments = lanes.lights.get(self.number)?.segments;
         let goes_on = segments < self.technique.subpaths(self.segments)[0];
-        let scattering = Some(self.point.scattering(segments, true));
-        goes_on.then_some((segments, VertexNumbers::Given { light: None, scattering }))
+        goes_on.then(|| {
+            let scattering = Some(self.point.scattering(segments, true));
+            (segments, VertexNumbers::Given { light: None, scattering })
+        })
     }
 
     /// The same of its camera subpath, whose last vertex may take a light sample.

@@ -11,7 +11,6 @@ use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::points::{Met, Set};
 use crate::transport::walk::termination::TRAPPED_FROM;
-use halflight_simd::kernels::shade::direct::Direct;
 use halflight_simd::kernels::shade::{BLOCK, Row};
 
 /// Block of vertices, with their light samples and BSDF samples.
@@ -131,14 +130,7 @@ impl<'a> Shading<'a> {
         if drawn != 0 {
             block.number(level, lights.has_many_lights());
         }
-        block.shadows.exists = 0;
-        let lit = if lights.is_empty() { 0 } else { block.begin_light(lit) };
-        if lit != 0 {
-            block.light(context, lit);
-            let Block { points, bsdf, light, value, pdf, each, throughput, shadows, .. } = &mut *block;
-            let surface = &points.surface;
-            Direct { surface, bsdf, light, value, pdf, each, throughput }.reach(level, shadows);
-        }
+        block.reach_lights(context, lit);
         *sets = if drawn == 0 {
             block.sample_by_numbers::<F>(level, &lobe, onward)
         } else {

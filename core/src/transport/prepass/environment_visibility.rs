@@ -220,7 +220,8 @@ impl<F: Features> PathIntegrator<'_, F> {
         (pixels / 4 / TASKS).clamp(PATHS.start, PATHS.end)
     }
 
-    /// Stores the vertices of so many `paths` of task `task` in its part of the [`VisibilityPrepass`].
+    /// Stores the vertices of task `task`, which has this number of `paths`, in its part of the
+    /// [`VisibilityPrepass`].
     pub fn store_vertices(&self, task: usize, paths: usize, part: &mut [VisibilityVertex]) {
         part.fill(VisibilityVertex { place: NO_PLACE, ..VisibilityVertex::default() });
         let crate::transport::PathSettings { width, height, seed, .. } = self.settings;
@@ -283,14 +284,14 @@ impl<F: Features> PathIntegrator<'_, F> {
         Footprint::default().slice::<Ray>(BINS).slice::<f32>(BINS).slice::<Hit>(BINS)
     }
 
-    /// Rays of all tables beside those of a first look at each.
+    /// Rays of all tables, beside one to every other bin of each.
     pub fn environment_rays(&self) -> usize {
         let pixels = self.settings.width as usize * self.settings.height as usize;
         (RAYS_PER_PIXEL * pixels).clamp(RAYS.start, RAYS.end)
     }
 
-    /// Learns table `number` by about so many `rays` after a first look. Returns its variances, weighted by
-    /// the number of vertices.
+    /// Learns table `number` by one ray to every other bin and about this number of `rays`. Returns its
+    /// variances, weighted by the number of vertices.
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::learn_table_scratch`] bytes.

@@ -200,7 +200,7 @@ impl<'a> Block<'a> {
     pub(in crate::transport) fn clear_bsdfs(&mut self) {
         (self.bsdf.diffuse, self.bsdf.metal, self.rough.exists) = (0, 0, 0);
         (self.coats.exists, self.coats.dielectric, self.smooth_coats) = (0, 0, 0);
-        (self.coats.apart, self.supplied) = (0, 0);
+        (self.coats.apart, self.supplied, self.coats.base_weight) = (0, 0, [1.0; BLOCK]);
         let SpecularBlock { exists, metal, dielectric, .. } = &mut self.specular;
         (*exists, *metal, *dielectric) = (0, 0, 0);
     }
@@ -217,7 +217,6 @@ mod tests {
     use glam::Vec3;
     use halflight_simd::kernels::shade::at;
     use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
-    use halflight_simd::kernels::shade::coat_apart::ApartSamples;
     use halflight_simd::kernels::shade::rough::Rough;
     use halflight_simd::kernels::shade::specular::SpecularSamples;
 
@@ -246,9 +245,9 @@ mod tests {
         let random = Random::new(5, 0);
         let (mut block, level) = (Block::new(), Level::detect());
         for round in 0..200 {
-            block.clear_bsdfs();
-            // Of coats of blocks before, apart from their bases.
+            // Coats of the block before were apart from their bases.
             block.coats.base_weight = [0.3; BLOCK];
+            block.clear_bsdfs();
             block.points.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
                 .map(|axis| axis.map(|coordinate| [coordinate; BLOCK]));
             let (mut lobe, mut all) = ([0.0; BLOCK], [Bsdf::Mirror(Mirror { reflectance: Rgb::ONE }); BLOCK]);
@@ -325,8 +324,8 @@ mod tests {
             block.weigh_apart(level);
             let Block { points, coats, given, numbers, .. } = &mut block;
             let (surface, u) = (&points.surface, &numbers.scatter);
-            let samples = ApartSamples { surface, coats, tables: &COATS, u, lobe: &lobes };
-            let sets = samples.compute(level, given);
+            let samples = CoatSamples { surface, coats, tables: &COATS, u, lobe: &lobes };
+            let sets = samples.compute_apart(level, given);
             for i in Set(block.coats.apart) {
                 let (bsdf, weight) = (&block.others[i], block.coats.base_weight[i]);
                 let (wo, wi) = (at(&block.points.surface.wo, i), at(&block.light.direction, i));

@@ -10,6 +10,7 @@ use crate::transport::walk::points::Set;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::shade::coat::CoatLight;
 use halflight_simd::kernels::shade::coat_apart::ApartLight;
+use halflight_simd::kernels::shade::direct::Direct;
 use halflight_simd::kernels::shade::emitter::EmitterSamples;
 use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::{BLOCK, at, put};
@@ -54,6 +55,20 @@ impl Block<'_> {
         if self.rough.exists & self.light.exists != 0 {
             let Block { points, rough, light, value, pdf, .. } = self;
             Rough { surface: &points.surface, rough }.light(context.level, &light.direction, value, pdf);
+        }
+    }
+
+    /// Takes light samples at the vertices in `lit`: unweighted shadow rays, with f |cos| and the density of BSDF
+    /// sampling.
+    #[inline]
+    pub(in crate::transport) fn reach_lights<F: Features>(&mut self, context: &SceneContext<F>, lit: u32) {
+        self.shadows.exists = 0;
+        let lit = if context.lights.is_empty() { 0 } else { self.begin_light(lit) };
+        if lit != 0 {
+            self.light(context, lit);
+            let Block { points, bsdf, light, value, pdf, each, throughput, shadows, .. } = self;
+            let surface = &points.surface;
+            Direct { surface, bsdf, light, value, pdf, each, throughput }.reach(context.level, shadows);
         }
     }
 

@@ -8,7 +8,6 @@ use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
 use glam::Vec3;
 use halflight_simd::kernels::shade::coat::CoatSamples;
-use halflight_simd::kernels::shade::coat_apart::ApartSamples;
 use halflight_simd::kernels::shade::numbers::Offsets;
 use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::scatter::Scatter;
@@ -117,8 +116,8 @@ impl Block<'_> {
             sets.delta |= delta & !coats.apart;
         }
         if coats.apart & onward != 0 {
-            let samples = ApartSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
-            let of_lobes = samples.compute(level, given);
+            let samples = CoatSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
+            let of_lobes = samples.compute_apart(level, given);
             sets.active &= of_lobes.exists | !coats.apart;
             sets.delta |= of_lobes.delta;
             sets.coat = of_lobes.coat;

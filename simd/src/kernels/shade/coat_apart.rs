@@ -3,7 +3,7 @@
 //! against its own density, with the operations of the scalar BSDFs in their order.
 
 use super::bsdf::{frame, to_local, viewer};
-use super::coat::{CoatBlock, CoatLanes, SampleLanes, coats};
+use super::coat::{CoatBlock, CoatLanes, CoatSamples, SampleLanes, coats};
 use super::coat_tables::CoatTables;
 use super::direct::{LightBlock, LightLanes};
 use super::ggx::Ggx;
@@ -168,21 +168,6 @@ impl Kernel for LightKernel<'_, '_> {
     }
 }
 
-/// Sampling of coats apart from their bases.
-#[derive(Debug)]
-pub struct ApartSamples<'b> {
-    /// Vertices.
-    pub surface: &'b SurfaceBlock,
-    /// Their coats, seen by [`CoatBlock::see`].
-    pub coats: &'b CoatBlock,
-    /// Tables of rough coats.
-    pub tables: &'b CoatTables,
-    /// Positions in the unit square.
-    pub u: &'b [Row; 2],
-    /// Numbers that choose the lobes.
-    pub lobe: &'b Row,
-}
-
 /// Sets of samples of coats apart from their bases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ApartSets {
@@ -194,25 +179,25 @@ pub struct ApartSets {
     pub coat: u32,
 }
 
-impl ApartSamples<'_> {
-    /// Samples over lanes.
+impl CoatSamples<'_> {
+    /// Samples of coats apart from their bases over lanes.
     #[inline(always)]
-    fn at<F: Load>(&self, from: F) -> (SampleLanes<F::Lanes>, <F::Lanes as Lanes>::Mask) {
+    fn at_apart<F: Load>(&self, from: F) -> (SampleLanes<F::Lanes>, <F::Lanes as Lanes>::Mask) {
         let Self { surface, coats, tables, u, lobe } = self;
         let u = [from.row(&u[0]), from.row(&u[1]), from.row(lobe)];
         apart(from, coats).sample_apart(tables, viewer(from.row3(&surface.wo)), u)
     }
 
-    /// Samples by the instructions of `level`, into the lanes of coats apart.
-    pub fn compute(&self, level: Level, out: &mut ScatterBlock) -> ApartSets {
+    /// Samples of coats apart from their bases by the instructions of `level`, into their lanes.
+    pub fn compute_apart(&self, level: Level, out: &mut ScatterBlock) -> ApartSets {
         level.dispatch(SampleKernel(self, out))
     }
 
-    /// Scalar reference; equals [`ApartSamples::compute`] to the bit where samples exist.
-    pub fn reference(&self, out: &mut ScatterBlock) -> ApartSets {
+    /// Scalar reference; equals [`CoatSamples::compute_apart`] to the bit where samples exist.
+    pub fn reference_apart(&self, out: &mut ScatterBlock) -> ApartSets {
         let mut sets = ApartSets { exists: 0, delta: 0, coat: 0 };
         for i in (0..super::BLOCK).filter(|i| self.coats.apart >> i & 1 == 1) {
-            let (sample, is_coat) = self.at(One(i));
+            let (sample, is_coat) = self.at_apart(One(i));
             put(&mut out.direction, i, sample.direction);
             put(&mut out.weight, i, sample.weight);
             (out.pdf[i], out.eta[i]) = (sample.pdf, 1.0);
@@ -224,7 +209,7 @@ impl ApartSamples<'_> {
     }
 }
 
-struct SampleKernel<'k, 'b>(&'k ApartSamples<'b>, &'k mut ScatterBlock);
+struct SampleKernel<'k, 'b>(&'k CoatSamples<'b>, &'k mut ScatterBlock);
 
 impl Kernel for SampleKernel<'_, '_> {
     type Out = ApartSets;
@@ -232,7 +217,7 @@ impl Kernel for SampleKernel<'_, '_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> ApartSets {
         let Self(samples, out) = self;
-        let ((sample, is_coat), apart) = (samples.at(All(simd)), simd.mask16(samples.coats.apart));
+        let ((sample, is_coat), apart) = (samples.at_apart(All(simd)), simd.mask16(samples.coats.apart));
         let (direction, weight) = (load3(simd, &out.direction), load3(simd, &out.weight));
         out.direction = vector::to_arrays(vector::select(apart, sample.direction, direction));
         out.weight = vector::to_arrays(vector::select(apart, sample.weight, weight));

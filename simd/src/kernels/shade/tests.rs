@@ -3,7 +3,7 @@
 use super::bsdf::BsdfBlock;
 use super::camera::CameraRays;
 use super::coat::{CoatBlock, CoatLight, CoatSamples};
-use super::coat_apart::{ApartBlock, ApartLight, ApartSamples, ApartSets};
+use super::coat_apart::{ApartBlock, ApartLight, ApartSets};
 use super::coat_tables::CoatTables;
 use super::direct::{Direct, LightBlock, ShadowBlock};
 use super::emitter::{EmitterBlock, EmitterSamples};
@@ -379,10 +379,10 @@ fn coats_apart_agree_with_the_reference_on_every_level() {
         let (surface, coats, tables, supplied) = (&surface, &coats, &tables, random.bits());
         let (each, throughput) = (&each, &throughput);
         let light = ApartLight { surface, coats, tables, light: &light, each, throughput, supplied };
-        let samples = ApartSamples { surface, coats, tables, u: &u, lobe: &lobe };
+        let samples = CoatSamples { surface, coats, tables, u: &u, lobe: &lobe };
         let (mut lit, mut wanted) = (ApartBlock::EMPTY, before.clone());
         light.reference(&mut lit);
-        let sets = samples.reference(&mut wanted);
+        let sets = samples.reference_apart(&mut wanted);
         let set = coats.apart & surface.regular;
         counts[0] += lanes(set).filter(|&i| lit.contribution[0][i] != 0.0).count();
         for (count, set) in counts[1..].iter_mut().zip([sets.exists, sets.delta, sets.coat & !sets.delta]) {
@@ -396,7 +396,7 @@ fn coats_apart_agree_with_the_reference_on_every_level() {
                 assert_eq!(all(&found), all(&lit), "{level:?} {i}");
             }
             let mut found = before.clone();
-            let found_sets = samples.compute(level, &mut found);
+            let found_sets = samples.compute_apart(level, &mut found);
             let all = |sets: &ApartSets| [sets.exists, sets.delta, sets.coat].map(|bits| bits & set);
             assert_eq!(all(&found_sets), all(&sets), "{level:?}");
             check_samples(&found, &wanted, &before, [sets.exists & set, coats.apart]);

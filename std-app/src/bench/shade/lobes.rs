@@ -5,7 +5,7 @@ use core::hint::black_box;
 use halflight_core::Level;
 use halflight_simd::kernels::shade::Row;
 use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
-use halflight_simd::kernels::shade::coat_apart::{ApartBlock, ApartLight, ApartSamples};
+use halflight_simd::kernels::shade::coat_apart::{ApartBlock, ApartLight};
 use halflight_simd::kernels::shade::numbers::{place_key, single};
 use halflight_simd::kernels::shade::rough::{Rough, RoughBlock};
 use halflight_simd::kernels::shade::scatter::ScatterBlock;
@@ -59,11 +59,11 @@ impl Block {
     pub(super) fn sample_apart(&self, level: Option<Level>) {
         let Self { surface, coats, numbers, .. } = self;
         let (u, lobe) = (&numbers.scatter, &numbers.choice);
-        let samples = ApartSamples { surface, coats, tables: &TABLES, u, lobe };
+        let samples = CoatSamples { surface, coats, tables: &TABLES, u, lobe };
         let mut out = ScatterBlock::EMPTY;
         black_box(match level {
-            None => samples.reference(&mut out),
-            Some(level) => samples.compute(level, &mut out),
+            None => samples.reference_apart(&mut out),
+            Some(level) => samples.compute_apart(level, &mut out),
         });
         black_box(&out);
     }
