@@ -58,8 +58,8 @@ impl Block<'_> {
         }
     }
 
-    /// Takes light samples at the vertices in `lit`: unweighted shadow rays, with f |cos| and the density of BSDF
-    /// sampling.
+    /// Takes light samples at the vertices in `lit`: unweighted shadow rays, with f |cos| and the density of
+    /// BSDF sampling.
     #[inline]
     pub(in crate::transport) fn reach_lights<F: Features>(&mut self, context: &SceneContext<F>, lit: u32) {
         self.shadows.exists = 0;
