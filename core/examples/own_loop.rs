@@ -25,7 +25,7 @@ fn main() -> Result<(), OutOfMemory> {
     let mut state = RenderState::new(SIZE, SIZE, Shard::WHOLE, &mut arena)?;
     let settings = PathSettings { width: SIZE, height: SIZE, seed: 1, max_depth: UNLIMITED };
     let pilots = PilotSize::USUAL;
-    let context = RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level, pilots };
+    let context = RenderContext { scene: &scene, bvh, lights, settings, level, pilots };
     let scratch = arena.slice(PathTracing::<DiffuseOnly>::scratch().bytes())?;
     let mut executor = Loop::new(scratch);
     let mut method = PathTracing::<DiffuseOnly>::new(&context, None, &mut executor)?;

@@ -68,8 +68,8 @@ pub fn render(
     let settings = PathSettings { width: size, height: size, seed: 1, max_depth: UNLIMITED };
     let context = RenderContext {
         scene: &scene,
-        bvh: &bvh,
-        lights: &lights,
+        bvh,
+        lights,
         settings,
         level: Level::BASELINE,
         pilots: PilotSize::USUAL,

@@ -79,8 +79,8 @@ fn with_filled<T>(
     let settings = PathSettings { width: size, height: size, seed, max_depth: UNLIMITED };
     let context = RenderContext {
         scene: &scene,
-        bvh: &bvh,
-        lights: &lights,
+        bvh,
+        lights,
         settings,
         level: Level::BASELINE,
         pilots: PilotSize::USUAL,

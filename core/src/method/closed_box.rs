@@ -63,8 +63,8 @@ pub(super) fn with_box<T>(materials: [Material; 4], work: impl FnOnce(&RenderCon
     let settings = PathSettings { width: SIDE, height: SIDE, seed: 1, max_depth: UNLIMITED };
     work(&RenderContext {
         scene: &scene,
-        bvh: &bvh,
-        lights: &lights,
+        bvh,
+        lights,
         settings,
         level: Level::detect(),
         pilots: PilotSize::USUAL,

@@ -68,7 +68,7 @@ pub struct EmissionGuide<'m> {
 impl<'m> EmissionGuide<'m> {
     /// Lights by power.
     fn by_power(context: &RenderContext, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, bvh, lights, .. } = *context;
+        let RenderContext { scene, ref bvh, ref lights, .. } = *context;
         let emission = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
         Ok(Self { emission, seen: None, by_power: None })
     }
@@ -85,7 +85,7 @@ impl<'m> EmissionGuide<'m> {
         executor: &mut impl Executor,
     ) -> Result<Self, OutOfMemory> {
         let GuideSettings { filter, max_depth, target, reserve } = settings;
-        let RenderContext { scene, lights, settings: paths, level, .. } = *context;
+        let RenderContext { scene, ref lights, settings: paths, level, .. } = *context;
         let sampler = VisiblePointSampler::new([paths.width, paths.height]);
         let sampler = if matches!(target, Target::Gathered(_)) { sampler.gathering() } else { sampler };
         let is_caustic = filter == PhotonFilter::Caustic;
@@ -245,7 +245,7 @@ impl<'p, 'a> Pilot<'p, 'a> {
         executor: &mut impl Executor,
     ) -> Result<Option<Outcome>, OutOfMemory> {
         let Self { context, settings, points, cells, powers } = self;
-        let RenderContext { scene, bvh, lights, level, .. } = **context;
+        let RenderContext { scene, ref bvh, ref lights, level, .. } = **context;
         let tracer = PhotonTracer::<F>::new(scene, bvh, lights, emission, *settings, level);
         cells.fill(0);
         powers.fill(0.0);

@@ -36,7 +36,7 @@ pub fn learn<'a, F: Features>(
 ) -> Result<(LightSampler<'a>, Option<VisibilityGain>), OutOfMemory> {
     let lights = context.lights;
     if lights.environment_is_constant().is_none() {
-        return Ok((*lights, None));
+        return Ok((lights, None));
     }
     let integrator = context.integrator::<F>();
     memory.lend("look at the sky", working(), |memory, working| {
@@ -52,11 +52,11 @@ pub fn learn<'a, F: Features>(
         })?;
         // A place that was not looked at may see anything.
         if !passed.is_complete {
-            return Ok((*lights, None));
+            return Ok((lights, None));
         }
         integrator.write_bin_directions(&mut prepass);
         let Some((grid, count)) = prepass.assign_tables(slots) else {
-            return Ok((*lights, Some(VisibilityGain::default())));
+            return Ok((lights, Some(VisibilityGain::default())));
         };
         let rays = context.pilots.of(integrator.environment_rays()) / count.max(1);
         let pieces = tables.iter_mut().zip(gains.iter_mut()).take(count);
@@ -65,7 +65,7 @@ pub fn learn<'a, F: Features>(
             Ok(Counters::default())
         })?;
         if !passed.is_complete {
-            return Ok((*lights, None));
+            return Ok((lights, None));
         }
         let mut gain = VisibilityGain::default();
         gains.iter().take(count).for_each(|other| gain += *other);

@@ -132,7 +132,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         executor: &mut impl Executor,
         others: usize,
     ) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, bvh, lights: all, .. } = *context;
+        let RenderContext { scene, ref bvh, lights: ref all, .. } = *context;
         let footprint = EmissionSampler::footprint(all);
         let emission =
             EmissionSampler::build(scene, all, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;

@@ -81,7 +81,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
         executor: &mut impl Executor,
         others: usize,
     ) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, bvh, lights, settings: paths, .. } = *context;
+        let RenderContext { scene, ref bvh, ref lights, settings: paths, .. } = *context;
         let footprint = EmissionSampler::footprint(lights);
         let emission =
             EmissionSampler::build(scene, lights, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;

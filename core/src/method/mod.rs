@@ -65,9 +65,9 @@ pub struct RenderContext<'a> {
     /// Geometry, materials, camera.
     pub scene: &'a Scene<'a>,
     /// The hierarchy over its triangles.
-    pub bvh: &'a Bvh<'a>,
+    pub bvh: Bvh<'a>,
     /// The distribution over its lights.
-    pub lights: &'a LightSampler<'a>,
+    pub lights: LightSampler<'a>,
     /// Size of the picture, seed, length of paths.
     pub settings: PathSettings,
     /// Highest instruction set to use.
@@ -79,18 +79,18 @@ pub struct RenderContext<'a> {
 impl<'a> RenderContext<'a> {
     /// The path tracer of the picture.
     pub fn integrator<F: Features>(&self) -> PathIntegrator<'a, F> {
-        PathIntegrator::new(self.scene, self.bvh, self.lights, self.settings, self.level)
+        PathIntegrator::new(self.scene, &self.bvh, &self.lights, self.settings, self.level)
     }
 
     /// The scene for rays.
     pub fn scene_context<F: Features>(&self) -> SceneContext<'a, F> {
-        SceneContext::new(self.scene, self.bvh, self.lights, self.level)
+        SceneContext::new(self.scene, &self.bvh, &self.lights, self.level)
     }
 
     /// Kernel radii of one pixel.
     pub fn radii(&self) -> RadiusSchedule {
         let size = [self.settings.width, self.settings.height];
-        RadiusSchedule::new((self.scene, self.bvh), size, self.level)
+        RadiusSchedule::new((self.scene, &self.bvh), size, self.level)
     }
 
     /// Pixels of the picture.

@@ -193,7 +193,7 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
         round: &mut Round<E>,
     ) -> Result<bool, OutOfMemory> {
         let Self { context, global, caustic, farthest, kernel, halves, used, .. } = self;
-        let RenderContext { scene, bvh, lights, level, .. } = *context;
+        let RenderContext { scene, ref bvh, ref lights, level, .. } = *context;
         let Some(maps) = halves.get_mut(half) else { return Ok(false) };
         if maps.number == Some(number) {
             return Ok(true);

@@ -103,7 +103,7 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
             return Ok(true);
         }
         self.sample = None;
-        let RenderContext { scene, bvh, lights, settings, level, .. } = self.context;
+        let RenderContext { scene, ref bvh, ref lights, settings, level, .. } = self.context;
         let settings = PhotonTracerSettings {
             keep: PhotonFilter::Reflected,
             seed: settings.seed,

@@ -67,8 +67,8 @@ pub(super) fn with_room(check: impl FnOnce(&RenderContext)) {
     let settings = PathSettings { width: 20, height: 20, seed: 1, max_depth: 8 };
     check(&RenderContext {
         scene: &scene,
-        bvh: &bvh,
-        lights: &lights,
+        bvh,
+        lights,
         settings,
         level: Level::BASELINE,
         pilots: PilotSize::USUAL,
@@ -229,7 +229,7 @@ fn environment_visibility_is_learned_in_rooms_that_see_little_of_it() {
         let scene = Scene { environment, lights: &[], ..*context.scene };
         let mut memory = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
         let lights = LightSampler::build(&scene, &mut Arena::over(&mut memory)).unwrap();
-        let context = RenderContext { scene: &scene, lights: &lights, ..*context };
+        let context = RenderContext { scene: &scene, lights, ..*context };
         let learn = |bytes: usize, most: u32| {
             let (mut memory, mut scratch) =
                 (lines(bytes), lines(environment_visibility::scratch::<All>().bytes()));

@@ -20,14 +20,14 @@ pub(super) fn learn<'a, F: Features>(
     let RenderSetup { lights, settings, workers, .. } = *setup;
     let wanted = settings.environment_visibility;
     if wanted == Some(false) || lights.environment_is_constant().is_none() {
-        return Ok((*lights, None));
+        return Ok((lights, None));
     }
     // Visibility only saves time: it is skipped if its tables and the memory of paths do not both fit.
     let each = scratch::<F>().and(PathIntegrator::<F>::scratch(WAVE)).bytes();
     let all = footprint().bytes().saturating_add(each.saturating_mul(workers.count()));
     if wanted.is_none() && !memory.has(all) {
         let reason = "not enough memory: sky light may be noisier";
-        return Ok((*lights, Some(Finding::new("environment_visibility", LeftOut, reason))));
+        return Ok((lights, Some(Finding::new("environment_visibility", LeftOut, reason))));
     }
     let mut scratch = memory.take_each("look at the sky", scratch::<F>(), workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);

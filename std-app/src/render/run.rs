@@ -108,13 +108,13 @@ impl WithFeatures for Render<'_> {
         let left =
             settings.stop.seconds.map(|limit| limit - clock.seconds() - picture::ending_seconds(pixels));
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
-        let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
+        let plain = RenderSetup { scene, bvh, lights, settings, workers: &workers };
         let affords_pilots = method != Method::Path || plain.goal().affords_pilots(pixels);
         let hurried = (!affords_pilots).then(|| without_pilots(settings));
         let settings = hurried.as_ref().unwrap_or(settings);
         let plain = RenderSetup { settings, ..plain };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
-        let setup = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
+        let setup = RenderSetup { scene, bvh, lights, settings, workers: &workers };
         let plain = setup.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
         let is_open = settings.method.is_none() && resumed.is_none();

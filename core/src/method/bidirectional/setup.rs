@@ -50,7 +50,7 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         executor: &mut impl Executor,
         others: usize,
     ) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, lights, settings: paths, .. } = *context;
+        let RenderContext { scene, ref lights, settings: paths, .. } = *context;
         let pixels = Tile::count(paths.width, paths.height) * PIXELS_PER_TILE;
         let picture = Footprint::default().slice::<[f32; 3]>(pixels);
         let picture = memory.take("splats", picture)?.slice(pixels)?;

@@ -46,7 +46,7 @@ pub(super) fn photon_tracer<'a, F: Features>(
     radii: RadiusSchedule,
     beside_records: bool,
 ) -> CausticPhotonTracer<'a, F> {
-    let RenderContext { scene, bvh, lights, settings, level, .. } = *context;
+    let RenderContext { scene, ref bvh, ref lights, settings, level, .. } = *context;
     let traced = PhotonTracerSettings {
         keep: PhotonFilter::Caustic,
         seed: settings.seed,

@@ -60,7 +60,7 @@ fn lent(lights: &LightSampler, step: usize) -> Footprint {
 
 /// Light paths of a step that there is memory for within `available` bytes.
 fn step(context: &RenderContext, available: usize) -> usize {
-    let (lights, wanted) = (context.lights, PATHS_PER_TASK * context.pilots.of(STEP / PATHS_PER_TASK));
+    let (lights, wanted) = (&context.lights, PATHS_PER_TASK * context.pilots.of(STEP / PATHS_PER_TASK));
     let left = available.saturating_sub(kept(lights).and(lent(lights, 0)).bytes());
     let task = Footprint::default().slice::<GuideSample>(PATHS_PER_TASK);
     (left / task.bytes() * PATHS_PER_TASK).clamp(FIRST_TEST, wanted.max(FIRST_TEST))
@@ -77,7 +77,7 @@ pub fn prepass<'a, F: Features>(
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
 ) -> Result<Prepass<'a>, OutOfMemory> {
-    let RenderContext { scene, bvh, lights, .. } = *context;
+    let RenderContext { scene, ref bvh, ref lights, .. } = *context;
     let step = step(context, memory.available());
     let (kept, lent) = (kept(lights), lent(lights, step));
     let later = kept.and(least_footprint()).bytes().saturating_add(settings.reserved);
@@ -126,7 +126,7 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         by_power: &EmissionSampler<'l>,
         arena: &mut Arena<'l>,
     ) -> Result<Learned<'l>, OutOfMemory> {
-        let RenderContext { scene, lights, .. } = *self.light_paths.context;
+        let RenderContext { scene, ref lights, .. } = *self.light_paths.context;
         let Some(mut stats) = GuideStats::aimed(scene, lights, by_power, arena)? else {
             return Ok(Learned::Paths);
         };
@@ -237,7 +237,7 @@ pub fn unseen<'m, F: Features>(
     memory: &mut impl MemorySource<'m>,
     executor: &mut impl Executor,
 ) -> Result<Option<f64>, OutOfMemory> {
-    let RenderContext { scene, bvh, lights, .. } = *context;
+    let RenderContext { scene, ref bvh, ref lights, .. } = *context;
     let lent = unseen_footprint(lights);
     if !super::are_possible(scene) || !memory.has(lent) {
         return Ok(None);

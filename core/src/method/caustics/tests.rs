@@ -27,7 +27,7 @@ fn with_mirrored_spot(check: impl FnOnce(&RenderContext)) {
         let scene = Scene { lights: &[spot], materials: &materials, ..*context.scene };
         let mut memory = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
         let lights = LightSampler::build(&scene, &mut Arena::over(&mut memory)).unwrap();
-        check(&RenderContext { scene: &scene, lights: &lights, ..*context });
+        check(&RenderContext { scene: &scene, lights, ..*context });
     });
 }
 
@@ -94,7 +94,7 @@ fn little_memory_makes_few_photons_and_none_paths_alone() {
 #[test]
 fn paths_do_not_see_a_spot_light_in_a_mirror() {
     with_mirrored_spot(|context| {
-        let mut memory = lines(unseen_footprint(context.lights).bytes());
+        let mut memory = lines(unseen_footprint(&context.lights).bytes());
         let mut scratch = lines(scratch::<All>().bytes());
         let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut memory));
         let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));

@@ -27,7 +27,7 @@ pub(in crate::transport) fn sums_from_light<F: Features>(
     end: End,
     to_light: Vec3,
 ) -> Sums {
-    let (scene, lights, position) = (context.scene, context.lights, end.point.position);
+    let (scene, lights, position) = (context.scene, &context.lights, end.point.position);
     let normal = normal_for_lights(end.point, end.bsdf);
     let kind = emission.light_type(lights, light);
     let (pdf_light, density) = match kind {

@@ -20,7 +20,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         rays: &[Ray],
     ) -> Sets {
         let Self { context, settings, .. } = self;
-        let (level, lights) = (context.level, context.lights);
+        let (level, lights) = (context.level, &context.lights);
         block.clear_bsdfs();
         let mut onward = 0;
         for i in Set(block.points.met) {

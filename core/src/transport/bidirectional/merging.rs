@@ -40,7 +40,7 @@ impl<F: Features> CameraPaths<'_, F> {
         }
         let origin = point.position + point.error * point.geometric_normal;
         let turns = sampler.single(dimension::PROBES + path.segments);
-        let boundary = kernel_boundary(self.context.bvh, self.context.level, (origin, true), &disc, turns);
+        let boundary = kernel_boundary(&self.context.bvh, self.context.level, (origin, true), &disc, turns);
         if !boundary.is_open() {
             density = self.density(path, vertex, (&disc, Some(&boundary)));
         }

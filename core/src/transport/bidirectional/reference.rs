@@ -55,7 +55,7 @@ impl<'a> Reference<'a> {
         merging: Option<MergeRadii>,
     ) -> Self {
         let settings = PathSettings { max_depth: settings.max_depth.min(MOST_SEGMENTS as u32), ..settings };
-        let context = SceneContext::new(context.scene, context.bvh, context.lights, Level::BASELINE);
+        let context = SceneContext::new(context.scene, &context.bvh, &context.lights, Level::BASELINE);
         Self { context, emission, settings, counts, merging }
     }
 
@@ -293,7 +293,7 @@ impl<'a> Reference<'a> {
 
     /// Kind of light `index` in MIS.
     fn kind(&self, index: u32) -> LightType {
-        self.emission.light_type(self.context.lights, index)
+        self.emission.light_type(&self.context.lights, index)
     }
 
     /// η at a vertex, and the way by which light comes there from one that is a caster if `from_caster`.

@@ -38,7 +38,7 @@ impl<F: Features> CameraPaths<'_, F> {
             let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
             let pdf_light = context.lights.pdf_escape(context.scene, position, normal, direction);
             let density = match counts.light_paths > 0.0 {
-                true => emission.density_of_environment(context.scene, context.lights, direction, position),
+                true => emission.density_of_environment(context.scene, &context.lights, direction, position),
                 false => 0.0,
             };
             weight = weight_of_hit(counts, &path.sums_of_hit(), pdf, pdf_light, density);
@@ -49,7 +49,7 @@ impl<F: Features> CameraPaths<'_, F> {
     /// Light of the surface that was hit.
     pub(super) fn emission(&self, path: &mut CameraPath, point: &SurfacePoint, hit: &Hit, direction: Vec3) {
         let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let radiance = emitted(scene, hit.triangle, point.uv, point.front);
         if radiance == Rgb::ZERO {
             return;
@@ -79,7 +79,7 @@ impl<F: Features> CameraPaths<'_, F> {
         queue: &mut Queue,
     ) -> Option<()> {
         let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let Vertex { point, bsdf, wo, sums, .. } = *vertex;
         let Lit { light, value, pdf, ray } = match &vertex.shaded {
             Some(shaded) => shaded.lit(scene)?,
@@ -103,7 +103,7 @@ impl<F: Features> CameraPaths<'_, F> {
 
     /// Samples a light at a vertex that ends segment `segments`, without lanes.
     fn sample_light(&self, segments: u32, vertex: &Vertex) -> Option<Lit> {
-        let (scene, lights) = (self.context.scene, self.context.lights);
+        let (scene, lights) = (self.context.scene, &self.context.lights);
         let Vertex { point, bsdf, wo, sampler, .. } = *vertex;
         let normal = normal_for_lights(point, bsdf);
         let first = dimension::vertex(segments);

@@ -130,7 +130,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let flat = FLAT_IN_ERRORS * place.error.max(FLAT_IN_REACH * reach);
         let axes = [first, second, normal];
         let mut search = Search { record: *record, middle, axes, flat, reach, least, bounds: [middle; 2] };
-        search.run(self.context.bvh, center, half);
+        search.run(&self.context.bvh, center, half);
         *record = search.record;
     }
 }

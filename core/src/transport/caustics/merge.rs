@@ -263,7 +263,7 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
         hit: EmissionHit,
         weight: f32,
     ) -> f32 {
-        let SceneContext { scene, lights, .. } = *context;
+        let SceneContext { scene, ref lights, .. } = *context;
         self.beside_photons(weight, state.ratio_to_light(), || match hit {
             EmissionHit::Environment { direction, position } => {
                 self.emission.density_of_environment(scene, lights, direction, position)
@@ -290,7 +290,7 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
         let link = ChainLink { point, bsdf, near: wo, far: wi, coat_alone: false };
         let to_light = link.reverse(context) / sample.pdf;
         self.beside_photons(weight, state.ratio.abs() * to_light, || {
-            self.emission.density_of_sample(context.scene, context.lights, sample, point.position)
+            self.emission.density_of_sample(context.scene, &context.lights, sample, point.position)
         })
     }
 

@@ -84,7 +84,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     /// `frame` pixels across and down. `F` has at least the features of the scene. The photon filter of
     /// `settings` is ignored.
     pub fn new(
-        (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a LightSampler<'a>),
+        (scene, bvh, lights): (&'a Scene<'a>, &Bvh<'a>, &LightSampler<'a>),
         emission: &'a EmissionSampler<'a>,
         settings: PhotonTracerSettings,
         (radii, frame): (RadiusSchedule, [u32; 2]),
@@ -218,7 +218,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     /// `chain_ratio` and `path_pdfs` before the first surface. `back` is the pdf of the direction to the
     /// light; `None` after a specular scattering.
     fn first(&self, state: &LightPathState, vertex: &Vertex, back: Option<f32>) -> (f32, f32) {
-        let LightWalk { context: SceneContext { scene, lights, .. }, emission, .. } = self.walk;
+        let LightWalk { context: SceneContext { scene, ref lights, .. }, emission, .. } = self.walk;
         let &Vertex { point, bsdf, to_light, .. } = vertex;
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
         let position = point.position;

@@ -121,7 +121,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
         // Mirrors and smooth glass alone have led it here.
         let is_hidden = state.from_caster == 1
             && !vertex.bsdf.is_delta()
-            && emission.light_type(context.lights, state.light) == LightType::Delta;
+            && emission.light_type(&context.lights, state.light) == LightType::Delta;
         if is_hidden && let Some(caustics) = &mut self.caustics {
             let _ = caustics.add((context, settings), state, vertex);
         }

@@ -24,7 +24,7 @@ impl<F: Features> Walk<'_, F> {
     /// Light of the environment that a camera subpath meets in `direction`.
     pub(super) fn escape(&self, subpath: &Subpath, direction: Vec3) -> Option<Contribution> {
         let Self { context, emission, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let radiance = scene.environment.as_ref()?.radiance(scene, direction);
         let densities = || {
             let (position, normal) = (Vec3::from(subpath.position), Vec3::from(subpath.normal));
@@ -45,7 +45,7 @@ impl<F: Features> Walk<'_, F> {
         direction: Vec3,
     ) -> Option<Contribution> {
         let Self { context, emission, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let radiance = emitted(scene, point.triangle, point.uv, point.front);
         let densities = || {
             let (position, normal) = (Vec3::from(subpath.position), Vec3::from(subpath.normal));
@@ -85,7 +85,7 @@ impl<F: Features> Walk<'_, F> {
 
     /// Samples a light at `vertex` by the numbers `u`, without lanes.
     pub(super) fn sample_light(&self, vertex: &Vertex, u: [f32; 3]) -> Option<Lit> {
-        let SceneContext { scene, lights, .. } = self.context;
+        let SceneContext { scene, ref lights, .. } = self.context;
         let Vertex { point, bsdf, wo, .. } = vertex;
         let light = lights.sample(scene, point.position, normal_for_lights(point, bsdf), u)?;
         let wi = point.frame.to_local(light.direction);
@@ -108,7 +108,7 @@ impl<F: Features> Walk<'_, F> {
         Lit { light, value, pdf, ray }: Lit,
     ) -> Option<(Ray, Contribution)> {
         let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let Vertex { point, bsdf, wo, sums: [sums, _], is_bent, .. } = vertex;
         let densities = (if light.delta { 0.0 } else { pdf }, light.pdf);
         let (mut emitted, mut density) = ((0.0, 0.0), 0.0);

@@ -87,7 +87,7 @@ impl<'a> Shading<'a> {
         numbers: impl Fn(u32) -> Option<(u32, VertexNumbers)>,
     ) {
         let Self { block, sets, has } = self;
-        let (level, lights) = (context.level, context.lights);
+        let (level, lights) = (context.level, &context.lights);
         let (mut lit, mut onward, mut drawn, mut lobe): (u32, u32, u32, Row) = (0, 0, 0, [0.0; BLOCK]);
         block.clear_bsdfs();
         for i in Set(block.points.met) {

@@ -146,7 +146,7 @@ impl<'a, F: Features> Walk<'a, F> {
 
     /// A light subpath by the dimensions of emission of `numbers`.
     pub(super) fn start_at_light(&self, numbers: &impl Numbers) -> Option<(Subpath, Ray)> {
-        let emitted = self.emission.emit(self.context.scene, self.context.lights, numbers)?;
+        let emitted = self.emission.emit(self.context.scene, &self.context.lights, numbers)?;
         let subpath = Subpath {
             throughput: (emitted.power / self.counts.light_paths).to_array(),
             position: emitted.ray.origin,

@@ -26,7 +26,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
         rest: &RemainingLight,
         wave: &mut Wavefront,
     ) {
-        let (scene, lights) = (self.context.scene, self.context.lights);
+        let (scene, lights) = (self.context.scene, &self.context.lights);
         let is_left = !rest.is_lit || vertex.apart;
         if lights.is_empty() || vertex.bsdf.is_delta() || !is_left {
             return;
@@ -93,7 +93,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
         let each = 1.0 / rest.light_samples as f32;
         let weigh = |pdf: f32| match alone {
             true => each,
-            false if later => each * environment_heuristic(self.context.lights, sample.pdf, each * pdf),
+            false if later => each * environment_heuristic(&self.context.lights, sample.pdf, each * pdf),
             false => each * power_heuristic(sample.pdf, each * pdf),
         };
         let weight = self.estimator.weight_light(&self.context, vertex, state, (sample, wi), weigh(pdf));

@@ -97,8 +97,8 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     /// A path tracer over frozen structures. `F` has at least the features of the scene ([`crate::census`]).
     pub fn new(
         scene: &'a Scene<'a>,
-        bvh: &'a Bvh<'a>,
-        lights: &'a LightSampler<'a>,
+        bvh: &Bvh<'a>,
+        lights: &LightSampler<'a>,
         settings: PathSettings,
         level: Level,
     ) -> Self {
@@ -159,7 +159,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let most = samples.len().saturating_mul(PIXELS_PER_TILE);
         let mut sampler = TileSampler::new(tile, samples);
         sampler.silhouette_pixels =
-            silhouette_pixels(self.context.scene, self.context.lights, &self.settings, tile);
+            silhouette_pixels(self.context.scene, &self.context.lights, &self.settings, tile);
         let mut wave = PathWave::<E::State, R>::new(wave.min(most), &mut arena)?;
         let has_silhouette = !sampler.silhouette_pixels.is_empty();
         loop {

@@ -36,7 +36,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         // One bit for each of the first 64 pixels; the others take no extra rays for lamps.
         let silhouette_pixels =
             pixels.iter().take(u64::BITS as usize).enumerate().fold(0, |bits, (place, pixel)| {
-                let is = is_on_silhouette(self.context.scene, self.context.lights, &self.settings, *pixel);
+                let is = is_on_silhouette(self.context.scene, &self.context.lights, &self.settings, *pixel);
                 bits | u64::from(is) << place
             });
         let on_silhouette = |place: u32| u64::checked_shr(silhouette_pixels, place).unwrap_or(0) & 1 == 1;

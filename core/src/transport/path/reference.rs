@@ -105,7 +105,7 @@ struct Start {
 impl Start {
     /// Radiance of the environment and its MIS weight.
     fn escape(&self, context: &SceneContext<All>, direction: Vec3) -> (Rgb, f32) {
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let Some(environment) = &scene.environment else { return (Rgb::ZERO, 0.0) };
         let seen = environment.radiance(scene, direction);
         if seen == Rgb::ZERO {
@@ -118,7 +118,7 @@ impl Start {
 
     /// Emission of the surface at `point` and its MIS weight.
     fn emission(&self, context: &SceneContext<All>, point: &SurfacePoint, direction: Vec3) -> (Rgb, f32) {
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let seen = emitted(scene, point.triangle, point.uv, point.front);
         if seen == Rgb::ZERO {
             return (seen, 0.0);
@@ -220,7 +220,7 @@ fn light_sample(
     u: [f32; 3],
     throughput: Rgb,
 ) -> Rgb {
-    let (scene, lights) = (context.scene, context.lights);
+    let (scene, lights) = (context.scene, &context.lights);
     let normal = if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
     let aim = lights.warp(point.position, normal, u);
     let Some((light, later)) = lights.sample_deferred(scene, point.position, normal, u, aim) else {

@@ -213,7 +213,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let mut weight = 1.0;
         if path.pdf < f32::INFINITY && radiance != Rgb::ZERO {
             let pdf = self.context.lights.pdf_escape(scene, position, path.normal.into(), direction);
-            weight = environment_heuristic(self.context.lights, path.pdf, pdf);
+            weight = environment_heuristic(&self.context.lights, path.pdf, pdf);
         }
         let hit = EmissionHit::Environment { direction, position };
         let weight = self.estimator.weight_hit(&self.context, state, hit, weight);

@@ -194,7 +194,7 @@ pub(in crate::transport) fn reflected<F: Features>(
     rotation: f32,
 ) -> RadianceEstimate {
     let origin = point.position + point.error * point.geometric_normal;
-    let boundary = kernel_boundary(context.bvh, context.level, (origin, is_caustic), disc, rotation);
+    let boundary = kernel_boundary(&context.bvh, context.level, (origin, is_caustic), disc, rotation);
     let is_flat = point.frame.normal == point.geometric_normal;
     if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
         let response = diffuse.reflectance * FRAC_1_PI;

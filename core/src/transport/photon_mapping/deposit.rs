@@ -84,8 +84,8 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
     /// Photon tracer over frozen structures. `F` has at least the features of the scene.
     pub fn new(
         scene: &'a Scene<'a>,
-        bvh: &'a Bvh<'a>,
-        lights: &'a LightSampler<'a>,
+        bvh: &Bvh<'a>,
+        lights: &LightSampler<'a>,
         emission: &'a EmissionSampler<'a>,
         settings: PhotonTracerSettings,
         level: Level,

@@ -81,7 +81,7 @@ impl<'a> GlobalMapLookup<'a> {
         distance: f32,
         rotation: f32,
     ) -> Option<Rgb> {
-        let (irradiance, radius) = self.irradiance((context.bvh, context.level), point, distance)?;
+        let (irradiance, radius) = self.irradiance((&context.bvh, context.level), point, distance)?;
         if let Bsdf::Diffuse(diffuse) = bsdf {
             return Some(irradiance * diffuse.reflectance * FRAC_1_PI);
         }

@@ -33,7 +33,7 @@ pub(super) const TEST_HEIGHT: f32 = 1e-3;
 /// Precomputation of irradiance at photons: a pass of tasks of [`IRRADIANCES`].
 #[derive(Clone, Copy)]
 pub struct PrecomputedIrradiance<'a> {
-    bvh: &'a Bvh<'a>,
+    bvh: Bvh<'a>,
     global: &'a PhotonMap<'a>,
     /// Maximum radius of a disc.
     farthest: f32,
@@ -44,13 +44,13 @@ pub struct PrecomputedIrradiance<'a> {
 impl<'a> PrecomputedIrradiance<'a> {
     /// Irradiances of `global`, a map of all photons, over discs of radius at most `farthest`.
     pub fn new(
-        bvh: &'a Bvh<'a>,
+        bvh: &Bvh<'a>,
         global: &'a PhotonMap<'a>,
         farthest: f32,
         kernel: Kernel,
         level: Level,
     ) -> Self {
-        Self { bvh, global, farthest, kernel, level }
+        Self { bvh: *bvh, global, farthest, kernel, level }
     }
 
     /// Number of irradiances.
@@ -86,7 +86,7 @@ impl<'a> PrecomputedIrradiance<'a> {
         let above = TEST_HEIGHT * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
         let rotation = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
         let boundary =
-            kernel_boundary(self.bvh, self.level, (place + above * normal, false), &disc, rotation);
+            kernel_boundary(&self.bvh, self.level, (place + above * normal, false), &disc, rotation);
         if boundary.visible_fraction(self.kernel, 1.0) < MIN_VISIBLE_FRACTION {
             return Photon::NONE;
         }

@@ -83,7 +83,7 @@ impl Block<'_> {
     /// Chooses and samples the lights of the vertices in `lit`.
     #[inline]
     fn sample_lights<F: Features>(&mut self, context: &SceneContext<F>, mut lit: u32) {
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let block = &mut *self;
         let light = &mut block.light;
         (light.exists, light.bounded, light.area, light.alone, light.balance) = (0, 0, 0, 0, 0);

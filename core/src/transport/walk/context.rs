@@ -17,9 +17,9 @@ pub struct SceneContext<'a, F> {
     /// Geometry, materials, camera.
     pub scene: &'a Scene<'a>,
     /// BVH over the triangles.
-    pub bvh: &'a Bvh<'a>,
+    pub bvh: Bvh<'a>,
     /// Sampler of the lights.
-    pub lights: &'a LightSampler<'a>,
+    pub lights: LightSampler<'a>,
     /// Highest instruction set to use.
     pub level: Level,
     /// True if a surface may have an opacity below 1, so that shadow rays continue behind a hit.
@@ -55,10 +55,10 @@ impl Segment {
 
 impl<'a, F: Features> SceneContext<'a, F> {
     /// Context of a scene; rays use instructions up to `level`.
-    pub fn new(scene: &'a Scene<'a>, bvh: &'a Bvh<'a>, lights: &'a LightSampler<'a>, level: Level) -> Self {
+    pub fn new(scene: &'a Scene<'a>, bvh: &Bvh<'a>, lights: &LightSampler<'a>, level: Level) -> Self {
         let has_cutouts = F::CUTOUT && scene.materials.iter().any(Material::has_cutout);
         let has_mirrors = scene.materials.iter().any(|material| material.surface.may_be_smooth());
-        Self { scene, bvh, lights, level, has_cutouts, has_mirrors, features: PhantomData }
+        Self { scene, bvh: *bvh, lights: *lights, level, has_cutouts, has_mirrors, features: PhantomData }
     }
 
     /// True if blocks of vertices are shaded in lanes. The baseline gains nothing by them, as measured with

@@ -197,7 +197,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
         for (i, state) in states.iter_mut().enumerate().take(paths) {
             let number = (first + i) as u32;
             if let Some(emitted) =
-                self.emission.emit(self.context.scene, self.context.lights, &numbers_of(number))
+                self.emission.emit(self.context.scene, &self.context.lights, &numbers_of(number))
             {
                 *state = LightPathState {
                     power: (emitted.power / self.paths as f32).to_array(),

@@ -169,8 +169,8 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
 #[derive(Clone, Copy)]
 pub(super) struct RenderSetup<'a> {
     pub(super) scene: &'a Scene<'a>,
-    pub(super) bvh: &'a Bvh<'a>,
-    pub(super) lights: &'a LightSampler<'a>,
+    pub(super) bvh: Bvh<'a>,
+    pub(super) lights: LightSampler<'a>,
     pub(super) settings: &'a Settings,
     pub(super) workers: &'a Workers<'a>,
 }
@@ -180,7 +180,7 @@ impl<'a> RenderSetup<'a> {
     pub(super) fn paths<F: Features>(&self, seed: u32) -> PathIntegrator<'a, F> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         let paths = PathSettings { seed, ..path_settings(settings) };
-        PathIntegrator::new(scene, bvh, lights, paths, settings.level)
+        PathIntegrator::new(scene, &bvh, &lights, paths, settings.level)
     }
 
     /// Rays that the time of the picture allows, if it is limited.

@@ -274,7 +274,7 @@ impl Reference<'_> {
     /// the cosine at the light, 1 where it has none.
     fn of_light(&self, path: &Path) -> Option<[f64; 3]> {
         let Self { context, emission, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
+        let (scene, lights) = (context.scene, &context.lights);
         let Light { index, position, .. } = path.light;
         let (first, to_light, squared) = {
             let (to_light, squared) = path.towards(1, 0);
