@@ -10,7 +10,7 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::method::path::PathTracing;
-use halflight_core::method::{Loop, Method, PilotSize, RenderContext, RenderState, Round, Shard};
+use halflight_core::method::{Loop, PilotSize, RenderContext, RenderMethod, RenderState, Round, Shard};
 use halflight_core::transport::{PathSettings, UNLIMITED};
 
 /// Pixels across and down.

@@ -4,151 +4,59 @@
 #[path = "room/mod.rs"]
 mod room;
 
-use halflight_core::bsdf::{DiffuseOnly, Only};
-use halflight_core::bvh::Bvh;
-use halflight_core::cache::irradiance::Metric;
-use halflight_core::cache::radiance::LobeSettings;
-use halflight_core::light::LightSampler;
-use halflight_core::memory::{Arena, Buffer, Line, OutOfMemory};
-use halflight_core::method::bidirectional::{Bidirectional, BidirectionalSettings};
-use halflight_core::method::instant_radiosity::{InstantRadiosity, VirtualLightSettings};
-use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
-use halflight_core::method::metropolis::{Metropolis, MetropolisSettings};
-use halflight_core::method::path::PathTracing;
-use halflight_core::method::photon_map::PhotonMapping;
-use halflight_core::method::sppm::ProgressivePhotonMapping;
 use halflight_core::method::{
-    Loop, Method, PhotonSettings, PilotSize, RenderContext, RenderState, Round, Shard,
+    BidirectionalSettings, CacheOptions, LobeSettings, PathOptions, PhotonSettings,
 };
-use halflight_core::transport::{PathSettings, UNLIMITED};
-use halflight_core::{Level, Rgb};
+use halflight_core::method::{MetropolisSettings, VirtualLightSettings};
+use halflight_core::{Arena, Level, Line, Loop, Method, RenderError, Renderer, Rgb, Settings, Until};
 
 /// Pixels across and down.
 pub const SIZE: usize = 32;
-/// Methods by their names on the command line.
-pub const METHODS: [&str; 10] = [
-    "path",
-    "light",
-    "sppm",
-    "bdpt",
-    "photon-map",
-    "vcm",
-    "instant-radiosity",
-    "mlt",
-    "irradiance-cache",
-    "radiance-cache",
-];
-/// Cache lines that all structures of any method take together.
+/// Cache lines that the structures of each method take together.
 pub const LINES: usize = 1 << 16;
-/// Bytes of working memory at most.
-const SCRATCH: usize = 640 << 10;
+/// Small photon maps, caches and sets of light paths.
+const PHOTONS: PhotonSettings = PhotonSettings { global: Some(8192), ..PhotonSettings::DEFAULT };
+const COUNTS: BidirectionalSettings =
+    BidirectionalSettings { light_paths: Some(1024), connections: Some(1), merging: Some(false) };
+const CACHE: CacheOptions = CacheOptions { strata: Some(8), records: Some(512), ..CacheOptions::DEFAULT };
+const LOBES: LobeSettings = LobeSettings { tolerance: 0.05, degree: 2, ..LobeSettings::DEFAULT };
+/// All methods.
+pub const METHODS: [Method; 10] = [
+    Method::Path(PathOptions::PLAIN),
+    Method::LightTracing(COUNTS),
+    Method::ProgressivePhotons(PHOTONS),
+    Method::Bidirectional(COUNTS),
+    Method::PhotonMap(PHOTONS),
+    Method::VertexMerging(BidirectionalSettings { merging: Some(true), ..COUNTS }),
+    Method::InstantRadiosity(VirtualLightSettings { light_paths: Some(1024), connections: None }),
+    Method::Metropolis(MetropolisSettings::DEFAULT),
+    Method::IrradianceCache(CACHE),
+    Method::RadianceCache(CACHE, LOBES),
+];
 
-/// Kinds of surfaces of the room with a wall of metal.
-type WithMetal = Only<false, true, false, false, false>;
+pub use room::fingerprint;
 
-/// Renders the room by method number `method` into `pixels`, row by row from the top, all structures in
-/// `memory`.
-pub fn render(
-    method: usize,
-    memory: &mut [Line],
-    pixels: &mut [Rgb; SIZE * SIZE],
-) -> Result<(), OutOfMemory> {
-    let (mut scene, size) = (room::scene(), SIZE as u32);
-    // Radiance records serve wide lobes.
-    let lobes =
-        (method == 9).then_some(LobeSettings { tolerance: 0.05, degree: 2, ..LobeSettings::default() });
-    let materials = room::with_metal_wall();
-    if lobes.is_some() {
-        scene.materials = &materials;
-    }
+/// Renders eight samples of each pixel of the room by `method`, row by row from the top, all in `memory`.
+pub fn render(method: Method, memory: &mut [Line], pixels: &mut [Rgb]) -> Result<(), RenderError> {
+    let scene = room::with_metal_wall();
+    let settings = Settings { level: Level::BASELINE, ..Settings::new([SIZE as u32; 2]).with_method(method) };
     let mut arena = Arena::over(memory);
-    let bvh = Bvh::build(&scene.mesh, &mut arena)?;
-    let lights = LightSampler::build(&scene, &mut arena)?;
-    let mut state = RenderState::new(size, size, Shard::WHOLE, &mut arena)?;
-    let settings = PathSettings { width: size, height: size, seed: 1, max_depth: UNLIMITED };
-    let context = RenderContext {
-        scene: &scene,
-        bvh,
-        lights,
-        settings,
-        level: Level::BASELINE,
-        pilots: PilotSize::USUAL,
-    };
-
-    // Working memory of tasks, less than Method::scratch() where they take one sample after the other.
-    let paths = if method == 4 { 8192 } else { 1024 };
-    let photons = PhotonSettings { global: Some(paths), ..PhotonSettings::default() };
-    let counts = BidirectionalSettings {
-        light_paths: Some(1024),
-        connections: Some(u32::from(method >= 3)),
-        merging: Some(method == 5),
-    };
-    let scratch = (arena.available() * 5 / 8).min(SCRATCH) / 64 * 64;
+    let scratch = Renderer::required_memory(&scene, &settings).scratch.min(arena.available() / 2);
     let mut executor = Loop::new(arena.slice(scratch)?);
-    let mut buffer = Buffer::new(arena.slice(arena.available())?);
-    let (memory, loops) = (&mut buffer, &mut executor);
-    let cache = CacheSettings {
-        metric: Metric::Halflight,
-        error: 1e-3,
-        strata: 8,
-        fewest: 256,
-        reserve: 0,
-        widens: true,
-        lobes,
-        picture: None,
-    };
-    let lights = VirtualLightSettings { light_paths: Some(1024), connections: None };
-    let chains = MetropolisSettings::default();
-    match method {
-        0 => run(PathTracing::<DiffuseOnly>::new(&context, Some(false), loops)?, &mut state, loops)?,
-        2 => run(
-            ProgressivePhotonMapping::<DiffuseOnly>::new(&context, photons, 0, memory, loops)?,
-            &mut state,
-            loops,
-        )?,
-        4 => run(PhotonMapping::<DiffuseOnly>::new(&context, photons, 0, memory, loops)?, &mut state, loops)?,
-        6 => run(
-            InstantRadiosity::<DiffuseOnly>::new(&context, &lights, (false, Some(false)), memory, loops, 0)?,
-            &mut state,
-            loops,
-        )?,
-        7 => run(Metropolis::<DiffuseOnly>::new(&context, &chains, memory, loops, 0)?, &mut state, loops)?,
-        8 => run(IrradianceCaching::<DiffuseOnly>::new(&context, &cache, memory)?, &mut state, loops)?,
-        9 => run(IrradianceCaching::<WithMetal>::new(&context, &cache, memory)?, &mut state, loops)?,
-        _ => run(Bidirectional::<DiffuseOnly>::new(&context, &counts, memory, loops, 0)?, &mut state, loops)?,
-    }
-    for (i, pixel) in pixels.iter_mut().enumerate() {
-        *pixel = state.film.mean((i % SIZE) as u32, (i / SIZE) as u32);
-    }
+    let mut renderer = Renderer::new(&scene, &settings, &mut arena, &mut executor)?;
+    renderer.step(&mut executor, Until::Samples(8))?;
+    pixels.iter_mut().zip(renderer.picture()).for_each(|(pixel, radiance)| *pixel = radiance);
     Ok(())
-}
-
-/// Eight samples of each pixel.
-fn run(mut method: impl Method, state: &mut RenderState, executor: &mut Loop) -> Result<(), OutOfMemory> {
-    method.round(&mut Round { executor, state, target: 8, step: 1 })
-}
-
-/// FNV-1a over the bits of the picture.
-pub fn fingerprint(pixels: &[Rgb]) -> u64 {
-    let bytes = pixels.iter().flat_map(|p| p.to_array()).flat_map(|v| v.to_bits().to_le_bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }
 
 fn main() {
     let (mut memory, mut pixels) = (vec![Line([0; 64]); LINES], [Rgb::ZERO; SIZE * SIZE]);
-    for (method, name) in METHODS.iter().enumerate() {
+    for method in METHODS {
         render(method, &mut memory, &mut pixels).expect("LINES is enough");
         for row in pixels.chunks(SIZE).step_by(2) {
-            row.iter().for_each(|p| print!("{}", char::from(b" .:-=+*#%@"[(12.0 * p.y).min(9.0) as usize])));
-            println!();
+            let shade = |pixel: &Rgb| char::from(b" .:-=+*#%@"[(12.0 * pixel.y).min(9.0) as usize]);
+            println!("{}", row.iter().map(shade).collect::<String>());
         }
-        let least = (0..)
-            .map(|i| LINES >> i)
-            .take_while(|lines| render(method, &mut memory[..*lines], &mut pixels).is_ok());
-        println!("{name} in {} KiB", least.last().map_or(0, |lines| lines / 16));
-    }
-    for method in 0..METHODS.len() {
-        render(method, &mut memory, &mut pixels).expect("LINES is enough");
-        println!("{:016x}", fingerprint(&pixels));
+        println!("{}\n{:016x}", method.name(), fingerprint(&pixels));
     }
 }

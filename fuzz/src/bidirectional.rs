@@ -30,7 +30,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let (sample, light_paths) = (input.arbitrary::<u32>()? % (1 << 30), 1 + usize::from(count) % PATHS);
         let connections = u32::from(connections % 4);
         let context = SceneContext::<All>::new(scene, bvh, lights, level(input)?);
-        let mut memory = lines(EmissionSampler::footprint(lights));
+        let mut memory = lines(EmissionSampler::footprint(lights.count()));
         let emission = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut arena(&mut memory));
         let emission = emission.expect("the footprint was granted");
         let counts = Counts {

@@ -29,7 +29,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let [kind, chains, mutations, threshold] = input.arbitrary::<[u8; 4]>()?;
         let sample = input.arbitrary::<u32>()?;
         let context = SceneContext::<All>::new(scene, bvh, lights, level(input)?);
-        let mut memory = lines(EmissionSampler::footprint(lights));
+        let mut memory = lines(EmissionSampler::footprint(lights.count()));
         let emission = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut arena(&mut memory));
         let emission = emission.expect("the footprint was granted");
         let pixels = Tile::count(settings.width, settings.height) * PIXELS_PER_TILE;

@@ -60,7 +60,7 @@ fn compare(scene: &Scene, connections: u32, merge_radius: Option<f64>, change: C
     with_structures(scene, |bvh, lights| {
         let settings = PathSettings { width: SIZE, height: SIZE, seed: 7, max_depth: 10 };
         let context = SceneContext::<All>::new(scene, bvh, lights, Level::detect());
-        let mut memory = TestArena::new(EmissionSampler::footprint(lights));
+        let mut memory = TestArena::new(EmissionSampler::footprint(lights.count()));
         let emission = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut memory.arena()).unwrap();
         let light_paths = LIGHT_PATHS as f32;
         let counts = Counts { light_paths, connections: 0.4 * connections as f32, light_samples: 1.0 };

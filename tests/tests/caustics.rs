@@ -52,7 +52,7 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     let bvh = Bvh::build(&scene.mesh, &mut bvh_memory.arena()).unwrap();
     let mut light_memory = TestArena::new(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
     let lights = LightSampler::build(scene, &mut light_memory.arena()).unwrap();
-    let mut emission_memory = TestArena::new(EmissionSampler::footprint(&lights));
+    let mut emission_memory = TestArena::new(EmissionSampler::footprint(lights.count()));
     let emission =
         EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut emission_memory.arena()).unwrap();
     let paths = PathIntegrator::<All>::scratch_with::<((), CausticMerging), ()>(2048);
@@ -401,10 +401,10 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     let bvh = Bvh::build(&scene.mesh, &mut bvh_memory.arena()).unwrap();
     let mut light_memory = TestArena::new(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
     let lights = LightSampler::build(&scene, &mut light_memory.arena()).unwrap();
-    let guided = GuideStats::guide_footprint(&lights);
+    let guided = GuideStats::guide_footprint(lights.count());
     let mut all = TestArena::new(
-        EmissionSampler::footprint(&lights)
-            .and(GuideStats::footprint(&lights))
+        EmissionSampler::footprint(lights.count())
+            .and(GuideStats::footprint(lights.count()))
             .and(guided)
             .and(guided)
             .and(guided),

@@ -27,7 +27,7 @@ fn sppm(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) 
 /// Photons of a map of `scene` with `tasks` tasks.
 fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
     with_structures(scene, |bvh, lights| {
-        let mut emission_memory = TestArena::new(EmissionSampler::footprint(lights));
+        let mut emission_memory = TestArena::new(EmissionSampler::footprint(lights.count()));
         let mut arena = emission_memory.arena();
         let emission = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut arena).unwrap();
         let settings = PhotonTracerSettings {

@@ -86,6 +86,7 @@ fn with_filled<T>(
         pilots: PilotSize::USUAL,
     };
     let cache = CacheSettings {
+        records: None,
         metric: Metric::Halflight,
         error,
         strata: 16,

@@ -1,6 +1,6 @@
 //! The scene of the examples: a pyramid in a room under a lamp.
-use glam::Vec3;
 use halflight_core::Rgb;
+use halflight_core::glam::Vec3;
 use halflight_core::scene::{Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Triangle};
 
 #[rustfmt::skip]
@@ -33,14 +33,13 @@ const MATERIALS: [Material; 4] = [
 ];
 
 /// The materials with rough metal in place of red.
-#[allow(dead_code, reason = "not all examples need it")]
-pub(super) fn with_metal_wall() -> [Material; 4] {
+const WITH_METAL: [Material; 4] = {
     let mut materials = MATERIALS;
     let reflectance = ColorInput { value: Rgb::splat(0.9), texture: None };
-    let roughness = ScalarInput { value: 0.85, texture: None };
-    materials[1].surface = Surface::Conductor { reflectance, roughness };
+    materials[1].surface =
+        Surface::Conductor { reflectance, roughness: ScalarInput { value: 0.85, texture: None } };
     materials
-}
+};
 
 /// The room, seen through its open front.
 pub(super) fn scene() -> Scene<'static> {
@@ -52,4 +51,17 @@ pub(super) fn scene() -> Scene<'static> {
         environment: None,
         camera: Camera::look_at(Vec3::new(0.0, 1.5, 6.5), Vec3::new(0.0, 1.4, 0.0), Vec3::Y, 40.0),
     }
+}
+
+/// The room with a wall of rough metal.
+#[allow(dead_code, reason = "not all examples need it")]
+pub(super) fn with_metal_wall() -> Scene<'static> {
+    Scene { materials: &WITH_METAL, ..scene() }
+}
+
+/// FNV-1a over the bits of a picture.
+#[allow(dead_code, unreachable_pub, reason = "one example needs it, and others see it")]
+pub fn fingerprint(pixels: &[Rgb]) -> u64 {
+    let bytes = pixels.iter().flat_map(|p| p.to_array()).flat_map(|v| v.to_bits().to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }

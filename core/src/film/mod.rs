@@ -66,6 +66,11 @@ impl<'m> Film<'m> {
         self.pixels.get(index).copied().unwrap_or_default()
     }
 
+    /// Mean of all samples of each pixel, row by row from the top.
+    pub fn rows(&self) -> impl Iterator<Item = Rgb> + '_ {
+        (0..self.height).flat_map(move |y| (0..self.width).map(move |x| self.mean(x, y)))
+    }
+
     /// Mean of all samples of a pixel; black without samples.
     pub fn mean(&self, x: u32, y: u32) -> Rgb {
         self.pixel(x, y).mean()

@@ -35,6 +35,12 @@ impl Counts {
 }
 
 impl<'m> LightSampler<'m> {
+    /// Number of lights of all kinds of `scene`, before its sampler is built.
+    pub fn count_in(scene: &Scene) -> usize {
+        let counts = Counts::of(scene);
+        counts.in_tree() + counts.distant + usize::from(scene.environment.is_some())
+    }
+
     /// Bytes that [`LightSampler::build`] takes and keeps.
     pub fn footprint(scene: &Scene) -> Footprint {
         let counts = Counts::of(scene);

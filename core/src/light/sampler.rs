@@ -276,7 +276,7 @@ impl<'m> LightSampler<'m> {
 
     /// Number of lights of all kinds, in the order of emission.
     #[inline]
-    pub(super) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.finite_count() + self.distant.len() + usize::from(self.environment.is_some())
     }
 

@@ -12,6 +12,11 @@ pub const ALIGNMENT: usize = 64;
 #[repr(C, align(64))]
 pub struct Line(pub [u8; ALIGNMENT]);
 
+impl Line {
+    /// A line of zeros.
+    pub const ZERO: Self = Self([0; ALIGNMENT]);
+}
+
 /// Error of an arena that is too small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfMemory {

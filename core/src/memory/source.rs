@@ -4,6 +4,11 @@ use super::{Arena, Footprint, OutOfMemory};
 
 /// A supply of memory that lives as long as the picture. Each piece has a name for reports.
 pub trait MemorySource<'m> {
+    /// The supply of [`MemorySource::within`].
+    type Within<'s>: MemorySource<'s>
+    where
+        Self: 's;
+
     /// Bytes that may still be taken, which limit structures of variable size. `usize::MAX` without a limit.
     fn available(&self) -> usize;
 
@@ -23,6 +28,9 @@ pub trait MemorySource<'m> {
         footprint: Footprint,
         work: impl FnOnce(&mut Self, &mut Arena) -> Result<T, OutOfMemory>,
     ) -> Result<T, OutOfMemory>;
+
+    /// The memory that is left, as a supply for structures of a shorter life. It is free again after them.
+    fn within(&mut self) -> Self::Within<'_>;
 
     /// True if `footprint` bytes may still be taken.
     fn has(&self, footprint: Footprint) -> bool {
@@ -63,6 +71,17 @@ impl<'m> Buffer<'m> {
 }
 
 impl<'m> MemorySource<'m> for Buffer<'m> {
+    type Within<'s>
+        = Buffer<'s>
+    where
+        'm: 's;
+
+    fn within(&mut self) -> Buffer<'_> {
+        Buffer::new(
+            self.free.iter_mut().max_by_key(|piece| piece.len()).map_or(&mut [], |piece| &mut **piece),
+        )
+    }
+
     fn available(&self) -> usize {
         let aligned = |piece: &[u8]| piece.as_ptr().align_offset(super::ALIGNMENT).min(piece.len());
         self.free.iter().map(|piece| piece.len() - aligned(piece)).max().unwrap_or(0)

@@ -65,6 +65,22 @@ pub struct EmissionGuide<'m> {
     pub by_power: Option<f64>,
 }
 
+/// Memory that a guide of so many lights keeps.
+fn kept(lights: usize, is_caustic: bool) -> Footprint {
+    let stats = match is_caustic {
+        true => GuideStats::footprint(lights).and(GuideStats::guide_footprint(lights)),
+        false => GuideStats::footprint_of_all(lights),
+    };
+    EmissionSampler::footprint(lights).and(stats)
+}
+
+/// Memory that [`EmissionGuide::learn`] takes for a picture of this `size` in a scene of so many lights.
+pub(super) fn footprint(lights: usize, size: [u32; 2], filter: PhotonFilter) -> Footprint {
+    let sampler = VisiblePointSampler::new(size);
+    let working = Pilot::footprint(&sampler).or(Pilot::footprint(&sampler.gathering()));
+    kept(lights, filter == PhotonFilter::Caustic).and(working)
+}
+
 impl<'m> EmissionGuide<'m> {
     /// Lights by power.
     fn by_power(context: &RenderContext, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
@@ -89,13 +105,8 @@ impl<'m> EmissionGuide<'m> {
         let sampler = VisiblePointSampler::new([paths.width, paths.height]);
         let sampler = if matches!(target, Target::Gathered(_)) { sampler.gathering() } else { sampler };
         let is_caustic = filter == PhotonFilter::Caustic;
-        let stats = if is_caustic {
-            GuideStats::footprint(lights).and(GuideStats::guide_footprint(lights))
-        } else {
-            GuideStats::footprint_of_all(lights)
-        };
-        let (power, working) = (EmissionSampler::footprint(lights), Pilot::footprint(&sampler));
-        let kept = power.and(stats);
+        let (power, working) = (EmissionSampler::footprint(lights.count()), Pilot::footprint(&sampler));
+        let kept = kept(lights.count(), is_caustic);
         if kept.and(working).bytes().saturating_add(reserve) > memory.available() {
             return Self::by_power(context, &mut memory.take("emission", power)?);
         }

@@ -8,7 +8,7 @@
 use super::executor::{Executor, Passed};
 use super::path::{PathTracing, Reuse};
 use super::splats::{add_splats, splats_of_tile};
-use super::{Method, RenderContext, Round};
+use super::{RenderContext, RenderMethod, Round};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use crate::findings::Decision::{LeftOut, Limited, Used};
@@ -100,6 +100,15 @@ pub struct InstantRadiosity<'a, F> {
     used: VirtualLightUse,
 }
 
+impl VirtualLightSettings {
+    /// Sets of virtual lights of a sample, for a picture of so many pixels.
+    fn sets(&self, pixels: usize, has_splats: bool) -> usize {
+        let each = if has_splats { PIXELS_PER_SPLAT_PATH } else { PIXELS_PER_LIGHT_PATH };
+        let wanted = self.light_paths.map_or(pixels / each, |paths| paths as usize);
+        wanted.div_ceil(PATHS_PER_TASK).clamp(1, MOST_SETS)
+    }
+}
+
 impl<'a, F: Features> InstantRadiosity<'a, F> {
     /// Working memory of a worker.
     pub fn scratch() -> Footprint {
@@ -118,6 +127,20 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
             .slice::<Splat>(splats)
     }
 
+    /// Memory for a picture of `size`, at most.
+    pub(super) fn usual_footprint(
+        [width, height]: [u32; 2],
+        lights: usize,
+        settings: &VirtualLightSettings,
+    ) -> Footprint {
+        let (pixels, tiles) = (width as usize * height as usize, Tile::count(width, height));
+        let [plain, splats] = [false, true].map(|splats| settings.sets(pixels, splats));
+        let sets = Self::footprint(plain, false).or(Self::footprint(splats, true));
+        let picture =
+            Footprint::default().slice::<TileLight>(tiles).slice::<[f32; 3]>(tiles * PIXELS_PER_TILE);
+        sets.and(picture).and(EmissionSampler::footprint(lights))
+    }
+
     /// Instant radiosity of `context`. What the bound cuts `is_clamped`; otherwise paths find it, with
     /// `reuse` or without; `None` where a pilot decides. There are fewer light paths where memory is short,
     /// `others` bytes of which stay free.
@@ -133,20 +156,16 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         others: usize,
     ) -> Result<Self, OutOfMemory> {
         let RenderContext { scene, ref bvh, lights: ref all, .. } = *context;
-        let footprint = EmissionSampler::footprint(all);
+        let footprint = EmissionSampler::footprint(all.count());
         let emission =
             EmissionSampler::build(scene, all, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;
         let PathSettings { width, height, .. } = context.settings;
         let tiles = if is_clamped { Tile::count(width, height) } else { 0 };
         let cut = slice("cut light", tiles, memory)?;
         let has_splats = has_hidden_caustics(&context.scene_context::<F>());
-        let (each, pixels) = match has_splats {
-            true => (PIXELS_PER_SPLAT_PATH, Tile::count(width, height) * PIXELS_PER_TILE),
-            false => (PIXELS_PER_LIGHT_PATH, 0),
-        };
+        let pixels = if has_splats { Tile::count(width, height) * PIXELS_PER_TILE } else { 0 };
         let picture = slice("splats", pixels, memory)?;
-        let wanted = settings.light_paths.map_or(context.pixels() / each, |paths| paths as usize);
-        let wanted = if all.is_empty() { 0 } else { wanted.div_ceil(PATHS_PER_TASK).clamp(1, MOST_SETS) };
+        let wanted = if all.is_empty() { 0 } else { settings.sets(context.pixels(), has_splats) };
         let available = memory.available().saturating_sub(others);
         let sets = wanted.min(available / Self::footprint(1, has_splats).bytes()).max(wanted.min(1));
         let lights = slice("virtual lights", sets * VERTICES_PER_TASK, memory)?;
@@ -333,7 +352,7 @@ impl VirtualLightUse {
     }
 }
 
-impl<F: Features> Method for InstantRadiosity<'_, F> {
+impl<F: Features> RenderMethod for InstantRadiosity<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         while let Some(sample) = round.next_sample() {
             if !self.prepare(sample, round)? {

@@ -13,7 +13,7 @@ use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::executor::{Executor, Passed};
 use super::record_placement::{CacheBuilder, LobeGathering, RecordPlacement, step_points};
 use super::view_placement::{ViewPlacement, Views};
-use super::{Method, RenderContext, Round};
+use super::{RenderContext, RenderMethod, Round};
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
 use crate::cache::radiance::{PooledRecord, ServedLobes};
@@ -21,12 +21,6 @@ use crate::cache::view::ViewRecords;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::cached::gather::GatherPoint;
 use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
-
-/// Pixels for each record of a cache without a limit of memory.
-const PIXELS_PER_RECORD: usize = 8;
-
-/// The fewest records that it has memory for, for small pictures.
-const FEWEST_RECORDS: usize = 4096;
 
 /// Least radius of a record in pixels: pixels that placement looks at and that are neighbours share it.
 pub const LEAST_PIXELS: f32 = 2.0;
@@ -133,8 +127,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             _ => None,
         };
         let available = memory.available().saturating_sub(settings.reserve);
-        let wanted = (context.pixels() / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
-        let wanted = wanted.saturating_add(settings.fewest);
+        let wanted = settings.records(context.pixels()).saturating_add(settings.fewest);
         let capacity =
             wanted.min(CacheBuilder::capacity_of(available / 2, representation)).max(settings.fewest);
         let bounds = context.bvh.bounds();
@@ -358,7 +351,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
     }
 }
 
-impl<F: Features> Method for IrradianceCaching<'_, F> {
+impl<F: Features> RenderMethod for IrradianceCaching<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         if !self.is_frozen {
             for number in 0..FILLED {

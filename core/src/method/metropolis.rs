@@ -9,7 +9,7 @@
 
 use super::executor::{Executor, Passed};
 use super::splats::{add_splats, splats_of_tile};
-use super::{Method, RenderContext, Round};
+use super::{RenderContext, RenderMethod, Round};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use crate::findings::Findings;
@@ -69,6 +69,18 @@ impl<'a, F: Features> Metropolis<'a, F> {
         Chains::<F>::scratch(LONGEST).or(Bootstrap::<F>::scratch()).or(pilot)
     }
 
+    /// Memory for a picture of `size` in a scene of so many lights.
+    pub(super) fn usual_footprint(
+        [width, height]: [u32; 2],
+        lights: usize,
+        settings: &MetropolisSettings,
+    ) -> Footprint {
+        let pixels = Tile::count(width, height) * PIXELS_PER_TILE;
+        let points = (width as usize * height as usize).saturating_mul(settings.mutations.max(1) as usize);
+        let splats = Footprint::default().slice::<[f32; 3]>(pixels).slice::<f32>(pixels / CELL);
+        EmissionSampler::footprint(lights).and(splats).and(Plan::new(points).footprint())
+    }
+
     /// Metropolis light transport of `context`, with fewer chains where memory is short, leaving `others`
     /// bytes.
     ///
@@ -82,7 +94,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
         others: usize,
     ) -> Result<Self, OutOfMemory> {
         let RenderContext { scene, ref bvh, ref lights, settings: paths, .. } = *context;
-        let footprint = EmissionSampler::footprint(lights);
+        let footprint = EmissionSampler::footprint(lights.count());
         let emission =
             EmissionSampler::build(scene, lights, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;
         let pixels = Tile::count(paths.width, paths.height) * PIXELS_PER_TILE;
@@ -224,7 +236,7 @@ impl Totals {
     }
 }
 
-impl<F: Features> Method for Metropolis<'_, F> {
+impl<F: Features> RenderMethod for Metropolis<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         while let Some(sample) = round.next_sample() {
             // A round that ended within a sample has left its splats.

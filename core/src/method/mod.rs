@@ -4,8 +4,10 @@
 //! what the scene needs, and adds samples to a film in [`Round`]s. An [`Executor`] of the caller runs the
 //! tasks of its passes: no method knows of threads, clocks or files.
 
+pub mod any;
 pub mod bidirectional;
 pub mod cache_resolution;
+pub mod cached_paths;
 pub mod caustics;
 pub mod choice;
 #[cfg(test)]
@@ -16,8 +18,10 @@ pub mod environment_visibility;
 pub mod executor;
 pub mod instant_radiosity;
 pub mod irradiance_cache;
+pub mod kind;
 mod light_vertices;
 pub mod metropolis;
+pub mod options;
 pub mod path;
 pub mod photon_map;
 pub mod photon_map_store;
@@ -25,6 +29,7 @@ pub mod photons;
 pub mod pilot;
 pub mod record_placement;
 pub mod round;
+pub mod setup;
 mod splats;
 pub mod sppm;
 pub mod view_placement;
@@ -43,11 +48,19 @@ pub fn rays_per_second(triangles: usize) -> f64 {
     RAYS_PER_SECOND / work_of_detail(triangles)
 }
 
+pub use crate::cache::radiance::LobeSettings;
+pub use any::{AnyMethod, ChosenMethod};
+pub use bidirectional::BidirectionalSettings;
 pub use executor::{Executor, Loop, Passed, Worker};
+pub use instant_radiosity::VirtualLightSettings;
+pub use kind::MethodKind;
+pub use metropolis::MetropolisSettings;
+pub use options::{CacheOptions, Method, MethodOptions, PathOptions};
 pub use photon_map_store::{PhotonMapPair, PhotonMapStore};
 pub use photons::{MapUse, PhotonSettings, PhotonUse};
 pub use pilot::PilotSize;
 pub use round::{RenderState, Round, Shard};
+pub use setup::{Attempt, MethodPlan, MethodSetup};
 
 use crate::Level;
 use crate::bsdf::Features;
@@ -113,7 +126,7 @@ pub struct LastMaps<'a> {
 /// Sample `n` of a pixel follows from the scene, the settings and `n`: neither from the division of samples
 /// into rounds nor from threads. A structure that several pixels use is drawn anew, or kept twice, for even
 /// and odd `n`: the halves of the film stay independent, and their difference shows all that is random.
-pub trait Method {
+pub trait RenderMethod {
     /// One round: brings the tiles of the film to their target, or less if the executor ends it early.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 //! 9), and path reuse among neighbouring pixels (Bekaert et al. 2002) where a pilot finds that it pays.
 
 use super::executor::Executor;
-use super::{Method, PilotSize, RenderContext, Round, pilot};
+use super::{PilotSize, RenderContext, RenderMethod, Round, pilot};
 use crate::bsdf::Features;
 use crate::findings::Decision::{LeftOut, Used};
 use crate::findings::{Finding, Findings, Value};
@@ -119,7 +119,7 @@ impl<'a, F: Features> PathTracing<'a, F> {
     }
 }
 
-impl<F: Features> Method for PathTracing<'_, F> {
+impl<F: Features> RenderMethod for PathTracing<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         if let Some(integrator) = self.reusing() {
             return round.tiles(u32::MAX, |tile, samples, scratch, pixels| {

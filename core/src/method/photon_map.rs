@@ -13,12 +13,13 @@ use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::Executor;
 use super::photons::{PhotonSettings, PhotonUse};
 use super::sppm::{FIRST_RADIUS, progressive};
-use super::{LastMaps, Method, PhotonMapStore, RenderContext, Round};
+use super::{LastMaps, PhotonMapStore, RenderContext, RenderMethod, Round};
 use crate::bsdf::Features;
 use crate::findings::Decision::LeftOut;
 use crate::findings::{Finding, Findings};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::photon::{Kernel, PhotonMap};
+use crate::scene::Scene;
 use crate::transport::photon_mapping::deposit::{
     PATHS_PER_TASK, PhotonFilter, PhotonTracer, PhotonTracerSettings, VERTICES_PER_TASK,
 };
@@ -120,6 +121,22 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
         PathIntegrator::<F>::scratch(WAVE).or(photons)
     }
 
+    /// Tasks of light paths of a global and of a caustic map, for a picture of so many pixels.
+    fn tasks(pixels: usize, has_caustics: bool, settings: &PhotonSettings) -> [usize; 2] {
+        let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS_PER_TASK).clamp(FEWEST, MOST);
+        let tasks = |asked: Option<u32>| {
+            asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS_PER_TASK).max(1))
+        };
+        [tasks(settings.global), if has_caustics { tasks(settings.caustic) } else { 0 }]
+    }
+
+    /// Memory of the maps of both halves, for a picture of so many pixels of `scene`.
+    pub(super) fn footprint(scene: &Scene, pixels: usize, settings: &PhotonSettings) -> Footprint {
+        let [global, caustic] = Self::tasks(pixels, may_have_caustics(scene), settings);
+        let half = Maps::footprint(global, caustic);
+        half.and(half)
+    }
+
     /// Photon mapping of `context`. Maps are as large as `memory` allows, of which `reserve` bytes stay free.
     ///
     /// # Errors
@@ -146,11 +163,7 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
         let seen = Target::Visible(FIRST_RADIUS as f32);
         let of_caustics = has_caustics.then(|| learn(PhotonFilter::Caustic, max_depth, seen)).transpose()?;
 
-        let usual = (context.pixels() / PIXELS_PER_PATH).div_ceil(PATHS_PER_TASK).clamp(FEWEST, MOST);
-        let tasks = |asked: Option<u32>| {
-            asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS_PER_TASK).max(1))
-        };
-        let wanted = [tasks(settings.global), if has_caustics { tasks(settings.caustic) } else { 0 }];
+        let wanted = Self::tasks(context.pixels(), has_caustics, &settings);
         // If memory is short, both maps get the same fraction of their footprints.
         let available = memory.available().saturating_sub(reserve) / 2;
         let share = (available as f64 / Maps::footprint(wanted[0], wanted[1]).bytes() as f64).min(1.0);
@@ -232,7 +245,7 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
     }
 }
 
-impl<F: Features> Method for PhotonMapping<'_, F> {
+impl<F: Features> RenderMethod for PhotonMapping<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         while let Some(sample) = round.next_sample() {
             let group = sample / GROUP;

@@ -16,6 +16,11 @@ pub struct PhotonSettings {
     pub caustic: Option<u32>,
 }
 
+impl PhotonSettings {
+    /// Usual settings.
+    pub const DEFAULT: Self = Self { kernel: Kernel::Epanechnikov, global: None, caustic: None };
+}
+
 /// Maps of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MapUse {

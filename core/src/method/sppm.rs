@@ -13,7 +13,7 @@
 use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::Executor;
 use super::photons::{PhotonSettings, PhotonUse};
-use super::{LastMaps, Method, PhotonMapStore, RenderContext, Round};
+use super::{LastMaps, PhotonMapStore, RenderContext, RenderMethod, Round};
 use crate::bsdf::Features;
 use crate::findings::Findings;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
@@ -54,6 +54,17 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
         PathIntegrator::<F>::scratch(WAVE).or(PhotonTracer::<F>::scratch())
     }
 
+    /// Tasks of light paths of a map, for a picture of so many pixels.
+    fn tasks(pixels: usize, settings: &PhotonSettings) -> usize {
+        let usual = pixels.clamp(FEWEST_PATHS, MOST_PATHS);
+        settings.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS_PER_TASK).max(1)
+    }
+
+    /// Memory of a map for a picture of so many pixels.
+    pub(super) fn footprint(pixels: usize, settings: &PhotonSettings) -> Footprint {
+        PhotonMapStore::footprint(Self::tasks(pixels, settings).saturating_mul(VERTICES_PER_TASK))
+    }
+
     /// Progressive photon mapping of `context`. Maps are as large as `memory` allows, of which `reserve`
     /// bytes stay free.
     ///
@@ -75,8 +86,7 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
             reserve: reserve.saturating_add(FEWEST_PATHS / PATHS_PER_TASK * of_task),
         };
         let guide = EmissionGuide::learn::<F>(context, guide, memory, executor)?;
-        let usual = context.pixels().clamp(FEWEST_PATHS, MOST_PATHS);
-        let wanted = settings.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS_PER_TASK).max(1);
+        let wanted = Self::tasks(context.pixels(), &settings);
         let tasks = wanted.min(memory.available().saturating_sub(reserve) / of_task).max(1);
         Ok(Self {
             context: *context,
@@ -125,7 +135,7 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
     }
 }
 
-impl<F: Features> Method for ProgressivePhotonMapping<'_, F> {
+impl<F: Features> RenderMethod for ProgressivePhotonMapping<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         while let Some(sample) = round.next_sample() {
             if !self.trace_photons(sample, round)? {

@@ -8,7 +8,8 @@ use super::path::PathTracing;
 use super::photon_map::PhotonMapping;
 use super::sppm::ProgressivePhotonMapping;
 use super::{
-    Loop, MapUse, Method, PhotonSettings, PhotonUse, PilotSize, RenderContext, RenderState, Round, Shard,
+    Loop, MapUse, PhotonSettings, PhotonUse, PilotSize, RenderContext, RenderMethod, RenderState, Round,
+    Shard,
 };
 use crate::bsdf::All;
 use crate::bvh::Bvh;

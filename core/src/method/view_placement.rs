@@ -40,6 +40,11 @@ pub(super) struct Views<'a> {
 }
 
 impl<'a> Views<'a> {
+    /// Memory for a picture of so many pixels.
+    pub(super) fn usual_footprint(pixels: usize) -> Footprint {
+        Self::footprint((pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS))
+    }
+
     fn footprint(capacity: usize) -> Footprint {
         let builder = ViewBuilder::footprint(capacity);
         builder.and(builder).and(step_footprint())
@@ -52,7 +57,7 @@ impl<'a> Views<'a> {
         memory: &mut impl MemorySource<'a>,
     ) -> Result<Option<Self>, OutOfMemory> {
         let capacity = (context.pixels() / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
-        let footprint = Self::footprint(capacity);
+        let footprint = Self::usual_footprint(context.pixels());
         let needed = footprint.bytes().saturating_add(reserve);
         if !may_serve(context.scene) || memory.available() < needed {
             return Ok(None);

@@ -103,6 +103,12 @@ impl Material {
         }
     }
 
+    /// Diffuse surface that emits `radiance` from its front.
+    pub const fn lamp(radiance: Rgb) -> Self {
+        let emission = ColorInput { value: radiance, texture: None };
+        Self { emission, ..Self::diffuse(Rgb::ZERO) }
+    }
+
     /// True if the material emits light.
     #[inline]
     pub fn emits(&self) -> bool {

@@ -315,6 +315,7 @@ impl MethodArgs {
                 metric: self.cache_metric.unwrap_or(settings.cache.metric),
                 error: self.cache_error.map(|error| error as f32),
                 strata: self.cache_rays.map(u32::isqrt),
+                records: None,
             },
             lobes: self.lobes(),
             photons: PhotonSettings { kernel, global: self.global_photons, caustic: self.caustic_photons },

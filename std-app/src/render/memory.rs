@@ -5,8 +5,10 @@ use super::{RenderError, Settings};
 use crate::compare::working_bytes;
 use crate::memory::{self, Budget};
 use crate::pages::Pages;
+use core::cell::Cell;
 use halflight_core::memory::{Arena, Footprint, Line, MemorySource, OutOfMemory};
 use halflight_core::scene::{Scene, Texels};
+use std::rc::Rc;
 
 /// Bytes of one structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,12 +25,15 @@ pub(super) type Bank = typed_arena::Arena<Vec<Line>>;
 /// Bytes in use, and their peak.
 pub(super) struct Memory<'m> {
     bank: &'m Bank,
+    /// Owner of the memory of [`Memory::within`].
+    shorter: Bank,
     /// Requested limit; near it, optional structures are smaller.
     limit: Option<usize>,
     /// Hard limit. Without a requested limit it depends on the machine, and must influence nothing else.
     hard_limit: usize,
     uses: Vec<MemoryUse>,
-    peak: usize,
+    /// Peak, also of memory within.
+    peak: Rc<Cell<usize>>,
 }
 
 impl<'m> Memory<'m> {
@@ -41,19 +46,9 @@ impl<'m> Memory<'m> {
             let bytes = size_of_val(&reference.pixels[..]) + working_bytes(reference);
             uses.push(MemoryUse { structure: "reference", bytes });
         }
-        let mut memory = Self { bank, limit, hard_limit, uses, peak: 0 };
-        memory.peak = memory.total();
+        let memory = Self { bank, shorter: Bank::new(), limit, hard_limit, uses, peak: Rc::default() };
+        memory.peak.set(memory.total());
         memory
-    }
-
-    /// Memory of another `bank`, counted from the bytes in use.
-    pub(super) fn within<'n>(&self, bank: &'n Bank) -> Memory<'n> {
-        Memory { bank, uses: self.uses.clone(), ..*self }
-    }
-
-    /// Takes over the peak of memory from [`Memory::within`], whose bank is to be dropped.
-    pub(super) fn release(&mut self, other: &Memory) {
-        self.peak = self.peak.max(other.peak);
     }
 
     /// Bytes available for reading a file.
@@ -120,7 +115,7 @@ impl<'m> Memory<'m> {
             Some(other) => other.bytes += bytes,
             None => self.uses.push(MemoryUse { structure, bytes }),
         }
-        self.peak = self.peak.max(self.total());
+        self.peak.set(self.peak.get().max(self.total()));
     }
 
     /// Takes `footprint` bytes `count` times: working memory of each thread.
@@ -150,7 +145,7 @@ impl<'m> Memory<'m> {
 
     /// Peak of the bytes in use.
     pub(super) fn peak(&self) -> usize {
-        self.peak
+        self.peak.get()
     }
 
     /// Bytes of each structure.
@@ -164,6 +159,18 @@ impl<'m> Memory<'m> {
 }
 
 impl<'m> MemorySource<'m> for Memory<'m> {
+    type Within<'s>
+        = Memory<'s>
+    where
+        'm: 's;
+
+    fn within(&mut self) -> Memory<'_> {
+        self.shorter = Bank::new();
+        let Self { shorter, limit, hard_limit, uses, peak, .. } = self;
+        let (uses, peak) = (uses.clone(), peak.clone());
+        Memory { bank: shorter, shorter: Bank::new(), limit: *limit, hard_limit: *hard_limit, uses, peak }
+    }
+
     fn available(&self) -> usize {
         Memory::available(self)
     }
@@ -210,7 +217,8 @@ mod tests {
     use super::*;
 
     fn memory(bank: &Bank, limit: usize) -> Memory<'_> {
-        Memory { bank, limit: Some(limit), hard_limit: limit, uses: Vec::new(), peak: 0 }
+        let (shorter, uses, peak) = (Bank::new(), Vec::new(), Rc::default());
+        Memory { bank, shorter, limit: Some(limit), hard_limit: limit, uses, peak }
     }
 
     #[test]
@@ -227,15 +235,14 @@ mod tests {
     }
 
     #[test]
-    fn released_memory_is_in_the_peak_alone() {
+    fn memory_of_a_shorter_life_is_in_the_peak_alone() {
         let (bank, bytes) = (Bank::new(), |bytes| Footprint::default().slice::<u8>(bytes));
         let mut memory = memory(&bank, 1 << 30);
         memory.take("film", bytes(64)).unwrap();
-        let own = Bank::new();
-        let mut other = memory.within(&own);
+        let mut other = memory.within();
         other.take("photons", bytes(128)).unwrap();
         assert_eq!(other.available(), (1 << 30) - 192);
-        memory.release(&other);
+        drop(other);
         assert_eq!((memory.available(), memory.peak()), ((1 << 30) - 64, 192));
     }
 }

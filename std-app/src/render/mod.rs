@@ -124,6 +124,9 @@ pub struct Settings {
     /// Approximate number of held-out points at which irradiance caches are compared with exact values after
     /// the render; `None`: no survey.
     pub survey: Option<u32>,
+    /// True for a deliberately biased method.
+    #[cfg(test)]
+    pub(crate) is_wrong: bool,
 }
 
 /// A film file written at intervals and at the end, outside the measured time.
@@ -170,6 +173,8 @@ impl Default for Settings {
             load_cache: None,
             save_cache: None,
             survey: None,
+            #[cfg(test)]
+            is_wrong: false,
         }
     }
 }

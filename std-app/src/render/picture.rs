@@ -337,7 +337,7 @@ impl<'a> Progressive<'a> {
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
         // A report that does not fit into memory is omitted: the picture is complete.
-        let survey = if interrupted { None } else { renderer.survey(workers).unwrap_or_default() };
+        let survey = if interrupted { None } else { renderer.survey().unwrap_or_default() };
         let findings = Findings::default().and(renderer.findings().into_iter().map(|finding| {
             let seconds = finding.phase.map(|phase| Value::Seconds(workers.seconds_of(phase)));
             finding.with_some("seconds", seconds)

@@ -5,7 +5,7 @@ use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
-use super::method::{self, Attempt, Method, Plan, RenderSetup};
+use super::method::{self, Attempt, Method, RenderSetup};
 use super::picture::{self, Picture};
 use super::threads::Workers;
 use super::{
@@ -22,8 +22,8 @@ use halflight_core::film::Tile;
 use halflight_core::findings::Decision::LeftOut;
 use halflight_core::findings::{Finding, Findings};
 use halflight_core::light::LightSampler;
-use halflight_core::memory::{Arena, Footprint};
-use halflight_core::method::{RenderState, Shard};
+use halflight_core::memory::{Arena, Footprint, MemorySource};
+use halflight_core::method::{MethodPlan, RenderState, Shard};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, UNLIMITED};
 use std::time::Instant;
@@ -118,28 +118,25 @@ impl WithFeatures for Render<'_> {
         let plain = setup.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
         let is_open = settings.method.is_none() && resumed.is_none();
-        let mut plan = if is_open { Plan::open() } else { Plan::from(method) };
+        let mut plan = if is_open { MethodPlan::open() } else { MethodPlan::from(method) };
         let mut may_fall_back = is_open;
         loop {
-            let bank = Bank::new();
-            let mut own = memory.within(&bank);
+            let mut own = memory.within();
             let attempt = method::set_up::<F>(plan, &setup, &mut own).and_then(|attempt| match attempt {
                 Attempt::Ready(renderer) => {
                     let audit = Audit::new::<F>(&setup, &mut own, renderer.chosen())?;
                     Ok(Ok((renderer, audit)))
                 }
-                Attempt::Instead(better) => Ok(Err(*better)),
+                Attempt::Instead(better) => Ok(Err(better)),
             });
             let (mut renderer, audit) = match attempt {
                 Ok(Ok(ready)) => ready,
                 Ok(Err(better)) => {
-                    memory.release(&own);
                     plan = better;
                     continue;
                 }
                 // A method that was chosen may need more memory than path tracing.
                 Err(RenderError::Memory { .. }) if may_fall_back => {
-                    memory.release(&own);
                     may_fall_back = false;
                     plan = Method::Path.into();
                     continue;
@@ -161,10 +158,8 @@ impl WithFeatures for Render<'_> {
             };
             let done = picture.render(&mut *renderer)?;
             if may_fall_back && falls_back(&done, settings, clock.seconds()) {
-                drop(renderer);
-                memory.release(&own);
                 may_fall_back = false;
-                plan = Plan::instead_of(&done);
+                plan = MethodPlan::instead_of(done.method, &done.findings);
                 continue;
             }
             let seconds = Seconds { build, ..done.seconds };

@@ -65,11 +65,14 @@ pub struct LobeSettings {
 
 impl Default for LobeSettings {
     fn default() -> Self {
-        Self::of(Basis::default())
+        Self::DEFAULT
     }
 }
 
 impl LobeSettings {
+    /// Usual settings.
+    pub const DEFAULT: Self = Self::of(Basis::Zernike);
+
     /// Usual settings with `basis`.
     pub const fn of(basis: Basis) -> Self {
         Self { basis, tolerance: 0.02, degree: basis.usual_degree() }

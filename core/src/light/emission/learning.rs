@@ -56,13 +56,13 @@ pub struct GuideStats<'m> {
 
 impl<'m> GuideStats<'m> {
     /// Number of cells of [`GuideStats::of_all`].
-    fn cells_of_all(lights: &LightSampler) -> usize {
-        let side = side(lights.count(), CELLS_OF_ALL);
-        lights.count() * side * side
+    fn cells_of_all(lights: usize) -> usize {
+        let side = side(lights, CELLS_OF_ALL);
+        lights * side * side
     }
 
     /// Bytes of [`GuideStats::of_all`] together with [`GuideStats::guide`].
-    pub fn footprint_of_all(lights: &LightSampler) -> Footprint {
+    pub fn footprint_of_all(lights: usize) -> Footprint {
         let cells = Self::cells_of_all(lights);
         let stats = Footprint::default().slice::<f32>(cells).slice::<f32>(cells);
         stats.and(AliasTable::footprint(cells))
@@ -73,7 +73,7 @@ impl<'m> GuideStats<'m> {
     /// # Errors
     /// [`OutOfMemory`] if the arena has less than [`GuideStats::footprint_of_all`].
     pub fn of_all(lights: &LightSampler, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let cells = Self::cells_of_all(lights);
+        let cells = Self::cells_of_all(lights.count());
         let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
         aimed.fill(0.0);
         learned.fill(0.0);
@@ -94,7 +94,7 @@ impl<'m> GuideStats<'m> {
     }
 
     /// Bytes of [`GuideStats::aimed`].
-    pub fn footprint(lights: &LightSampler) -> Footprint {
+    pub fn footprint(lights: usize) -> Footprint {
         let cells = cells(lights);
         Footprint::default().slice::<f32>(cells).slice::<f32>(cells)
     }
@@ -110,7 +110,7 @@ impl<'m> GuideStats<'m> {
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
         let side = side(lights.count(), MAX_CELLS);
-        let cells = cells(lights);
+        let cells = cells(lights.count());
         let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
         aimed.fill(0.0);
         learned.fill(0.0);
@@ -195,7 +195,7 @@ impl<'m> GuideStats<'m> {
     }
 
     /// Bytes of [`GuideStats::guide`].
-    pub fn guide_footprint(lights: &LightSampler) -> Footprint {
+    pub fn guide_footprint(lights: usize) -> Footprint {
         AliasTable::footprint(cells(lights))
     }
 }
@@ -209,9 +209,9 @@ fn side(lights: usize, most: usize) -> usize {
     side
 }
 
-fn cells(lights: &LightSampler) -> usize {
-    let side = side(lights.count(), MAX_CELLS);
-    lights.count() * side * side
+fn cells(lights: usize) -> usize {
+    let side = side(lights, MAX_CELLS);
+    lights * side * side
 }
 
 /// Calls `visit` with about `count` points, evenly spread over all surfaces that cast caustics.

@@ -65,9 +65,9 @@ pub struct EmissionSampler<'m> {
 }
 
 impl<'m> EmissionSampler<'m> {
-    /// Bytes that [`EmissionSampler::build`] takes.
-    pub fn footprint(lights: &LightSampler) -> Footprint {
-        AliasTable::footprint(lights.count())
+    /// Bytes that [`EmissionSampler::build`] takes for so many lights.
+    pub fn footprint(lights: usize) -> Footprint {
+        AliasTable::footprint(lights)
     }
 
     /// Sampler for the lights of a scene within `bounds`.
@@ -335,7 +335,7 @@ mod tests {
         let bytes = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let mut memory = vec![Line([0; 64]); bytes.bytes() / 64];
         let lights = LightSampler::build(scene, &mut Arena::over(&mut memory)).unwrap();
-        let mut memory = vec![Line([0; 64]); EmissionSampler::footprint(&lights).bytes() / 64];
+        let mut memory = vec![Line([0; 64]); EmissionSampler::footprint(lights.count()).bytes() / 64];
         let mut arena = Arena::over(&mut memory);
         let emission = EmissionSampler::build(scene, &lights, &bounds, &mut arena).unwrap();
         assert_eq!(arena.available(), 0);

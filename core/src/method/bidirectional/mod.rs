@@ -12,7 +12,7 @@ mod setup;
 
 use super::executor::{Executor, Passed};
 use super::splats::{add_splats, splats_of_tile};
-use super::{Method, PhotonMapStore, RenderContext, Round, light_vertices};
+use super::{PhotonMapStore, RenderContext, RenderMethod, Round, light_vertices};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat};
 use crate::light::EmissionSampler;
@@ -99,7 +99,7 @@ impl VertexMerging<'_> {
     }
 }
 
-impl<F: Features> Method for Bidirectional<'_, F> {
+impl<F: Features> RenderMethod for Bidirectional<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         while let Some(sample) = round.next_sample() {
             let Some(light) = self.light_paths_of(sample, round)? else { return Ok(()) };

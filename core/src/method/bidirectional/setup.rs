@@ -12,6 +12,7 @@ use crate::method::emission_guide::{EmissionGuide, GuideSettings, Target};
 use crate::method::pilot::PILOT_TILES;
 use crate::method::splats::splats_of_tile;
 use crate::method::{Executor, PhotonMapStore, RenderContext, caustics};
+use crate::scene::Scene;
 use crate::transport::bidirectional::light_pass::{PATHS_PER_TASK, TaskOutput, VERTICES_PER_TASK};
 use crate::transport::bidirectional::mis::Counts;
 use crate::transport::bidirectional::vertex::LightVertex;
@@ -29,6 +30,20 @@ const WIDEST_RADIUS: f64 = 4.0;
 /// Ratio of the light of merges and splats to all other from which on radii grow.
 const WIDENING_RATIO: f64 = 0.8;
 
+impl BidirectionalSettings {
+    /// Tasks of light paths of a sample, for a picture of so many pixels.
+    fn tasks(&self, pixels: usize, merges: bool) -> usize {
+        let pixels_per_path = if merges { 1 } else { PIXELS_PER_LIGHT_PATH };
+        let wanted = self.light_paths.map_or(pixels / pixels_per_path, |paths| paths as usize);
+        wanted.div_ceil(PATHS_PER_TASK).clamp(1, MOST_TASKS)
+    }
+
+    /// Light vertices that `tasks` of light paths may store.
+    fn stored(&self, tasks: usize, merges: bool) -> usize {
+        if self.connections() > 0 || merges { tasks * VERTICES_PER_TASK } else { 0 }
+    }
+}
+
 impl<'a, F: Features> Bidirectional<'a, F> {
     /// Memory of `tasks` of light paths, with room for `vertices`.
     fn footprint(tasks: usize, vertices: usize) -> Footprint {
@@ -36,6 +51,25 @@ impl<'a, F: Features> Bidirectional<'a, F> {
             .slice::<LightVertex>(vertices)
             .slice::<Splat>(tasks * VERTICES_PER_TASK)
             .slice::<TaskOutput>(tasks)
+    }
+
+    /// Memory of `tasks` of light paths and of their photons.
+    fn footprint_of(tasks: usize, settings: &BidirectionalSettings, merges: bool) -> Footprint {
+        let photons = if merges { tasks * VERTICES_PER_TASK } else { 0 };
+        let photons = if merges { PhotonMapStore::footprint(photons) } else { Footprint::default() };
+        Self::footprint(tasks, settings.stored(tasks, merges)).and(photons)
+    }
+
+    /// Memory of splats and light paths for a picture of `size` of `scene`.
+    pub(in crate::method) fn usual_footprint(
+        scene: &Scene,
+        [width, height]: [u32; 2],
+        settings: &BidirectionalSettings,
+    ) -> Footprint {
+        let merges = settings.merging.unwrap_or_else(|| caustics::are_possible(scene));
+        let tasks = settings.tasks(width as usize * height as usize, merges);
+        let splats = Footprint::default().slice::<[f32; 3]>(Tile::count(width, height) * PIXELS_PER_TILE);
+        splats.and(Self::footprint_of(tasks, settings, merges))
     }
 
     /// Bidirectional path tracing of `context`, with fewer light paths where memory is short, leaving
@@ -55,16 +89,9 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         let picture = Footprint::default().slice::<[f32; 3]>(pixels);
         let picture = memory.take("splats", picture)?.slice(pixels)?;
         let merges = settings.merging.unwrap_or_else(|| caustics::are_possible(scene));
-        let pixels_per_path = if merges { 1 } else { PIXELS_PER_LIGHT_PATH };
-        let wanted = settings.light_paths.map_or(context.pixels() / pixels_per_path, |paths| paths as usize);
-        let wanted = if lights.is_empty() { 0 } else { wanted.div_ceil(PATHS_PER_TASK).clamp(1, MOST_TASKS) };
-        let has_vertices = settings.connections() > 0 || merges;
-        let stored = |tasks: usize| if has_vertices { tasks * VERTICES_PER_TASK } else { 0 };
-        let bytes = |tasks: usize| {
-            let photons =
-                if merges { PhotonMapStore::footprint(tasks * VERTICES_PER_TASK).bytes() } else { 0 };
-            Self::footprint(tasks, stored(tasks)).bytes() + photons
-        };
+        let wanted = if lights.is_empty() { 0 } else { settings.tasks(context.pixels(), merges) };
+        let stored = |tasks: usize| settings.stored(tasks, merges);
+        let bytes = |tasks: usize| Self::footprint_of(tasks, settings, merges).bytes();
         let reserve = others.saturating_add(bytes(1));
         let emission = Self::emission(context, (merges, reserve), memory, executor)?;
         let available = memory.available().saturating_sub(others);

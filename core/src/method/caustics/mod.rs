@@ -16,7 +16,7 @@ pub use photons::{CausticPhotons, RecordPhotons};
 pub use prepass::{Decision, Prepass, prepass, unseen, unseen_footprint};
 
 use super::path::{PathTracing, Reuse};
-use super::{Executor, LastMaps, Method, PhotonUse, RenderContext, Round};
+use super::{Executor, LastMaps, PhotonUse, RenderContext, RenderMethod, Round};
 use crate::bsdf::Features;
 use crate::census::Census;
 use crate::findings::Decision::LeftOut;
@@ -31,6 +31,11 @@ use crate::transport::{CausticMerging, PathIntegrator, PathReuse};
 pub fn scratch<F: Features>() -> Footprint {
     PathIntegrator::<F>::scratch_with::<((), CausticMerging), PathReuse>(WAVE)
         .or(CausticPhotonTracer::<F>::scratch())
+}
+
+/// Memory of a prepass and of photon maps for a picture of so many `pixels` with so many `lights`.
+pub(super) fn footprint(lights: usize, pixels: usize) -> Footprint {
+    prepass::footprint(lights, pixels).and(photons::footprint(pixels))
 }
 
 /// True if `scene` has casters, receivers and light.
@@ -140,7 +145,7 @@ impl<'a, F: Features> CausticPathTracing<'a, F> {
     }
 }
 
-impl<F: Features> Method for CausticPathTracing<'_, F> {
+impl<F: Features> RenderMethod for CausticPathTracing<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         match &mut self.photons {
             None => self.paths.round(round),

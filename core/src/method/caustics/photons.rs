@@ -7,7 +7,7 @@ use super::benefit::PATHS_PER_SAMPLE;
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
 use crate::bsdf::Features;
 use crate::light::EmissionSampler;
-use crate::memory::{MemorySource, OutOfMemory};
+use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::method::executor::{Executor, Passed};
 use crate::method::path::PathTracing;
 use crate::method::{MapUse, PhotonMapPair, PhotonMapStore, PhotonUse, RenderContext, Round, pilot};
@@ -101,6 +101,28 @@ impl Block {
     }
 }
 
+/// Light paths of a map for each sample that it serves, with `budget` times the usual photons; within
+/// `most_rays` of a limited picture. Beside records there are more maps.
+fn paths_per_sample(pixels: usize, budget: f64, beside_records: bool, most_rays: Option<f64>) -> usize {
+    let paths = budget * PATHS_PER_SAMPLE * pixels as f64;
+    let maps = if beside_records { FIRST_MAPS_BESIDE_RECORDS } else { FIRST_MAPS };
+    let in_time = most_rays.map(|rays| rays * FIRST_SHARE / (maps * RAYS_PER_PATH));
+    let paths = in_time.map_or(paths, |most| paths.min(most));
+    (paths as usize).clamp(FEWEST_PATHS, MOST_PATHS)
+}
+
+/// Tasks of a map for so many light paths of a sample.
+fn tasks(paths_per_sample: usize) -> usize {
+    (paths_per_sample * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS_PER_TASK)
+}
+
+/// Memory of both maps with the usual photons for each of so many pixels.
+pub(in crate::method) fn footprint(pixels: usize) -> Footprint {
+    let paths = (PATHS_PER_SAMPLE * pixels as f64) as usize;
+    let map = PhotonMapStore::footprint(tasks(paths.clamp(1, MOST_PATHS)) * PHOTONS_PER_TASK);
+    map.and(map)
+}
+
 impl<'a> CausticPhotons<'a> {
     /// Memory for photons of `emission`, as many as there is memory for beside what is reserved; beside
     /// records, half as many. `None` where there is none.
@@ -114,13 +136,9 @@ impl<'a> CausticPhotons<'a> {
         memory: &mut impl MemorySource<'a>,
     ) -> Result<Option<Self>, OutOfMemory> {
         let CausticSettings { beside_records, reserved, most_rays } = settings;
-        let paths = emission.benefit.photon_budget() * PATHS_PER_SAMPLE * context.pixels() as f64;
-        let maps = if beside_records { FIRST_MAPS_BESIDE_RECORDS } else { FIRST_MAPS };
-        let in_time = most_rays.map(|rays| rays * FIRST_SHARE / (maps * RAYS_PER_PATH));
-        let paths = in_time.map_or(paths, |most| paths.min(most));
-        let paths_per_sample = (paths as usize).clamp(FEWEST_PATHS, MOST_PATHS);
-        let wanted =
-            (paths_per_sample * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS_PER_TASK);
+        let budget = emission.benefit.photon_budget();
+        let paths_per_sample = paths_per_sample(context.pixels(), budget, beside_records, most_rays);
+        let wanted = tasks(paths_per_sample);
         if !memory.has(least_footprint()) {
             return Ok(None);
         }

@@ -4,7 +4,7 @@
 use super::benefit::{Benefit, missing};
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
 use crate::bsdf::Features;
-use crate::light::{EmissionSampler, GuideStats, LightSampler};
+use crate::light::{EmissionSampler, GuideStats};
 use crate::memory::{Arena, Footprint, Line, MemorySource, OutOfMemory};
 use crate::method::path::PathTracing;
 use crate::method::{Executor, RenderContext, pilot};
@@ -47,20 +47,27 @@ pub struct Prepass<'a> {
     pub lacks_memory: bool,
 }
 
-/// Memory that a picture with photons keeps of its prepass.
-fn kept(lights: &LightSampler) -> Footprint {
+/// Memory that a picture with photons and so many lights keeps of its prepass.
+pub(in crate::method) fn kept(lights: usize) -> Footprint {
     EmissionSampler::footprint(lights).and(GuideStats::guide_footprint(lights))
 }
 
 /// Memory of the prepass itself, with so many light paths in a step.
-fn lent(lights: &LightSampler, step: usize) -> Footprint {
+fn lent(lights: usize, step: usize) -> Footprint {
     let stats = GuideStats::footprint(lights).and(GuideStats::guide_footprint(lights));
     EmissionSampler::footprint(lights).and(stats).slice::<GuideSample>(step)
 }
 
+/// Memory of a prepass whose steps have a light path for each of so many pixels.
+pub(in crate::method) fn footprint(lights: usize, pixels: usize) -> Footprint {
+    let step = pixels.next_multiple_of(PATHS_PER_TASK).clamp(FIRST_TEST, STEP);
+    kept(lights).and(lent(lights, step))
+}
+
 /// Light paths of a step that there is memory for within `available` bytes.
 fn step(context: &RenderContext, available: usize) -> usize {
-    let (lights, wanted) = (&context.lights, PATHS_PER_TASK * context.pilots.of(STEP / PATHS_PER_TASK));
+    let (lights, wanted) =
+        (context.lights.count(), PATHS_PER_TASK * context.pilots.of(STEP / PATHS_PER_TASK));
     let left = available.saturating_sub(kept(lights).and(lent(lights, 0)).bytes());
     let task = Footprint::default().slice::<GuideSample>(PATHS_PER_TASK);
     (left / task.bytes() * PATHS_PER_TASK).clamp(FIRST_TEST, wanted.max(FIRST_TEST))
@@ -79,7 +86,7 @@ pub fn prepass<'a, F: Features>(
 ) -> Result<Prepass<'a>, OutOfMemory> {
     let RenderContext { scene, ref bvh, ref lights, .. } = *context;
     let step = step(context, memory.available());
-    let (kept, lent) = (kept(lights), lent(lights, step));
+    let (kept, lent) = (kept(lights.count()), lent(lights.count(), step));
     let later = kept.and(least_footprint()).bytes().saturating_add(settings.reserved);
     if !memory.has(kept.and(lent)) || later > memory.available() {
         return Ok(Prepass { decision: Decision::Paths, share: None, lacks_memory: true });
@@ -220,8 +227,8 @@ impl<E: Executor> LightPaths<'_, E> {
     }
 }
 
-/// Memory that [`unseen`] borrows.
-pub fn unseen_footprint(lights: &LightSampler) -> Footprint {
+/// Memory that [`unseen`] borrows in a scene of so many lights.
+pub fn unseen_footprint(lights: usize) -> Footprint {
     EmissionSampler::footprint(lights).slice::<GuideSample>(STEP)
 }
 
@@ -238,7 +245,7 @@ pub fn unseen<'m, F: Features>(
     executor: &mut impl Executor,
 ) -> Result<Option<f64>, OutOfMemory> {
     let RenderContext { scene, ref bvh, ref lights, .. } = *context;
-    let lent = unseen_footprint(lights);
+    let lent = unseen_footprint(lights.count());
     if !super::are_possible(scene) || !memory.has(lent) {
         return Ok(None);
     }

@@ -9,7 +9,7 @@ use crate::light::LightSampler;
 use crate::memory::{Arena, Buffer, Footprint, OutOfMemory};
 use crate::method::path::PathTracing;
 use crate::method::tests::{PLENTY, film, lines, with_room};
-use crate::method::{Loop, Method, PhotonUse, RenderContext};
+use crate::method::{Loop, PhotonUse, RenderContext, RenderMethod};
 use crate::scene::{Material, PointLight, Scene};
 use glam::Vec3;
 use std::vec::Vec;
@@ -94,7 +94,7 @@ fn little_memory_makes_few_photons_and_none_paths_alone() {
 #[test]
 fn paths_do_not_see_a_spot_light_in_a_mirror() {
     with_mirrored_spot(|context| {
-        let mut memory = lines(unseen_footprint(&context.lights).bytes());
+        let mut memory = lines(unseen_footprint(context.lights.count()).bytes());
         let mut scratch = lines(scratch::<All>().bytes());
         let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut memory));
         let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));

@@ -10,6 +10,12 @@ use crate::scene::Scene;
 /// Strata along a side behind rough surfaces are half as many, in multiples of this.
 const BLOCK: usize = 8;
 
+/// Pixels for each record of a cache without a limit of memory.
+const PIXELS_PER_RECORD: usize = 8;
+
+/// The fewest records that it has memory for, for small pictures.
+const FEWEST_RECORDS: usize = 4096;
+
 /// Settings of both caches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CacheSettings {
@@ -19,6 +25,8 @@ pub struct CacheSettings {
     pub error: f32,
     /// Strata along a side of the hemisphere of a record.
     pub strata: usize,
+    /// Records of each cache, if memory suffices; `None`: by the pixels of the picture.
+    pub records: Option<u32>,
     /// Records that each cache has memory for at least, whatever is available.
     pub fewest: usize,
     /// Bytes that are to stay available.
@@ -33,6 +41,11 @@ pub struct CacheSettings {
 }
 
 impl CacheSettings {
+    /// Records of each cache for a picture of so many pixels, if memory suffices.
+    pub(in crate::method) fn records(&self, pixels: usize) -> usize {
+        self.records.map_or((pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS), |records| records as usize)
+    }
+
     /// Strata along a side of records that are seen, and of those behind rough surfaces, of which a pixel
     /// sees the mean.
     pub(super) fn strata_of(strata: usize) -> [usize; 2] {

@@ -13,6 +13,7 @@ use std::vec::Vec;
 type Caching<'a> = IrradianceCaching<'a, DiffuseOnly>;
 
 const SETTINGS: CacheSettings = CacheSettings {
+    records: None,
     metric: Metric::Halflight,
     error: 1e-4,
     strata: 8,

@@ -16,9 +16,14 @@ pub struct MetropolisSettings {
     pub threshold: f32,
 }
 
+impl MetropolisSettings {
+    /// Usual choices.
+    pub const DEFAULT: Self = Self { space: PrimarySpace::Multiplexed, mutations: 4, threshold: 2.0 };
+}
+
 impl Default for MetropolisSettings {
     fn default() -> Self {
-        Self { space: PrimarySpace::default(), mutations: 4, threshold: 2.0 }
+        Self::DEFAULT
     }
 }
 

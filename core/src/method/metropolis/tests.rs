@@ -8,7 +8,7 @@ use crate::film::Pixel;
 use crate::memory::{Buffer, Footprint, OutOfMemory};
 use crate::method::path::PathTracing;
 use crate::method::tests::{film, lines, with_room};
-use crate::method::{Loop, Method, RenderContext};
+use crate::method::{Loop, RenderContext, RenderMethod};
 use core::sync::atomic::{AtomicU32, Ordering};
 use std::vec::Vec;
 

@@ -168,7 +168,7 @@ impl<'a> Audit<'a> {
         }
         let pixels = Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height));
         let threads = scratch::<F>().bytes().saturating_mul(workers.count());
-        let unseen = if is_biased { unseen_footprint(&lights).bytes() } else { 0 };
+        let unseen = if is_biased { unseen_footprint(lights.count()).bytes() } else { 0 };
         threads.saturating_add(pixels.bytes()).saturating_add(unseen)
     }
 

@@ -8,6 +8,9 @@ use halflight_core::estimate::Difference;
 
 const SIZE: u32 = 64;
 
+/// A method that converges to wrong radiance, whose place a deliberately biased one takes.
+const WRONG: Method = Method::ClampedInstantRadiosity;
+
 fn picture(settings: Settings) -> RenderResult {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
     let loaded = load(scene.as_ref(), &LoadOptions::default()).unwrap();
@@ -21,6 +24,7 @@ fn settings(method: Method, spp: u32, seed: u32, audit: f64) -> Settings {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     Settings {
         method: Some(method),
+        is_wrong: method == WRONG,
         stop,
         seed,
         audit: Some(audit),
@@ -40,7 +44,7 @@ fn a_region_that_is_a_tenth_too_bright_is_found() {
     let (mut held, mut sum) = (0, 0.0);
     let mut truth = 0.0;
     for seed in 2..6 {
-        let result = picture(settings(Method::Wrong, 128, seed, 0.3));
+        let result = picture(settings(WRONG, 128, seed, 0.3));
         let (image, audit) = (&result.image, result.audit.as_ref().unwrap());
         assert!(audit.is_biased(), "{audit:?}");
         // The same samples without the factor are an exact reference.
@@ -73,7 +77,7 @@ fn path_tracing_is_found_unbiased() {
 #[test]
 fn an_error_below_the_bias_is_out_of_reach() {
     let stop = Stop { spp: Some(4096), error: Some(0.001), ..Stop::default() };
-    let result = picture(Settings { stop, ..settings(Method::Wrong, 0, 5, 0.2) });
+    let result = picture(Settings { stop, ..settings(WRONG, 0, 5, 0.2) });
     assert_eq!(result.ending, Ending::Biased);
     assert!(result.spp < 1024 && result.error.unwrap().upper > 0.001, "{} {:?}", result.spp, result.error);
 }
@@ -81,7 +85,7 @@ fn an_error_below_the_bias_is_out_of_reach() {
 #[test]
 fn an_error_above_the_bias_is_the_sum_of_both() {
     let stop = Stop { spp: Some(4096), error: Some(0.02), ..Stop::default() };
-    let result = picture(Settings { stop, ..settings(Method::Wrong, 0, 5, 0.2) });
+    let result = picture(Settings { stop, ..settings(WRONG, 0, 5, 0.2) });
     let (audit, error) = (result.audit.unwrap(), result.error.unwrap());
     assert_eq!((result.ending, error), (Ending::Done, audit.total));
     assert!(error.upper <= 0.02 && audit.noise.relmse <= error.relmse, "{} {audit:?}", result.spp);
@@ -94,7 +98,7 @@ fn an_audit_that_alone_keeps_a_picture_from_its_end_goes_on() {
     let work = |audit: Option<f64>| {
         let mut sums = (0, 0);
         for seed in 3..8 {
-            let result = picture(Settings { stop, audit, ..settings(Method::Wrong, 0, seed, 0.0) });
+            let result = picture(Settings { stop, audit, ..settings(WRONG, 0, seed, 0.0) });
             assert!(
                 result.ending == Ending::Done && result.error.unwrap().upper <= 0.02,
                 "{:?}",
@@ -112,7 +116,7 @@ fn an_audit_that_alone_keeps_a_picture_from_its_end_goes_on() {
 
 #[test]
 fn a_large_picture_that_is_hardly_audited_has_few_pixels_audited() {
-    let large = |audit| picture(Settings { width: 512, height: 416, ..settings(Method::Wrong, 8, 3, audit) });
+    let large = |audit| picture(Settings { width: 512, height: 416, ..settings(WRONG, 8, 3, audit) });
     let [few, all] = [0.001, 0.3].map(|share| large(share).audit.unwrap());
     // Twelve pixels for each of 8 x 8 regions, and one per tile.
     assert_eq!([few.pixels, all.pixels], [768, 832]);
@@ -125,7 +129,7 @@ fn any_number_of_threads_finds_the_same() {
     for audit in [None, Some(0.1)] {
         let [one, three] = [1, 3].map(|threads| {
             let threads = Some(threads);
-            let result = picture(Settings { stop, threads, audit, ..settings(Method::Wrong, 0, 2, 0.0) });
+            let result = picture(Settings { stop, threads, audit, ..settings(WRONG, 0, 2, 0.0) });
             (result.image, result.audit.map(|audit| Audited { seconds: 0.0, ..audit }))
         });
         assert!(one == three, "{audit:?}");
@@ -134,7 +138,7 @@ fn any_number_of_threads_finds_the_same() {
 
 #[test]
 fn the_share_of_the_work_is_kept() {
-    let result = picture(settings(Method::Wrong, 256, 3, 0.05));
+    let result = picture(settings(WRONG, 256, 3, 0.05));
     let audit = result.audit.unwrap();
     let rays = result.counters.all_rays() as f64;
     let stop = Stop { error: Some(1e-9), spp: Some(128), ..Stop::default() };
@@ -148,8 +152,8 @@ fn the_share_of_the_work_is_kept() {
 #[test]
 fn no_audit_where_none_is_asked_for() {
     assert!(picture(Settings { audit: None, ..settings(Method::Path, 8, 0, 0.1) }).audit.is_none());
-    assert!(picture(settings(Method::Wrong, 8, 0, 0.0)).audit.is_none());
-    assert!(picture(Settings { audit: None, ..settings(Method::Wrong, 8, 0, 0.1) }).audit.is_some());
+    assert!(picture(settings(WRONG, 8, 0, 0.0)).audit.is_none());
+    assert!(picture(Settings { audit: None, ..settings(WRONG, 8, 0, 0.1) }).audit.is_some());
 }
 
 #[test]
@@ -157,7 +161,7 @@ fn shards_are_audited_together() {
     let folder = std::env::temp_dir().join(format!("halflight-audit-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let films: Vec<_> = (0..3).map(|shard| folder.join(format!("{shard}.film"))).collect();
-    let settings = settings(Method::Wrong, 128, 3, 0.3);
+    let settings = settings(WRONG, 128, 3, 0.3);
     for (index, film) in films.iter().enumerate() {
         let checkpoint = Some(Checkpoint { path: film.clone(), every: 60.0 });
         let shard = Shard { index: index as u32, count: 3 };

@@ -34,7 +34,7 @@ impl Identity {
         settings: &Settings,
         loaded: Option<String>,
     ) -> Self {
-        let mut own = method.own_settings(settings);
+        let mut own = settings.of_method(method);
         if let Some(loaded) = loaded {
             own += &format!(", loaded {loaded}");
         }

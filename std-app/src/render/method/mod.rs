@@ -1,168 +1,69 @@
-//! Rendering methods: properties, interface and setup.
-//!
-//! A round consists of passes over a method's structures and of tiles of the picture, all run in parallel
-//! ("The unit of work" in docs/architecture.md). A new method needs a variant and a row in
-//! [`properties`], and an arm in [`set_up`].
+//! Methods of the core in the program: memory, threads and files around them.
 
-mod bidirectional;
-mod cache_settings;
-mod choice;
-mod irradiance_cache;
-mod path;
+mod cache_keeper;
 mod photon_view;
-mod prepared;
-mod properties;
 #[cfg(test)]
 mod wrong;
 
-pub use cache_settings::CacheSettings;
 pub use halflight_core::cache::radiance::{Basis, LobeSettings};
-pub use halflight_core::method::PhotonSettings;
+pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Method, PhotonSettings};
 pub use photon_view::{MapView, PhotonView};
-pub use properties::Method;
 
-use super::audit::Audit;
+use super::audit::{Audit, SHARE};
+use super::deadline::End;
 use super::memory::Memory;
 use super::rewritten_file::RewrittenFile;
 use super::run::path_settings;
-use super::survey::Survey;
+use super::survey::{self, Survey};
 use super::threads::{ThreadedRound, Threads, Workers};
-use super::{RenderError, RenderResult, Settings};
+use super::{RenderError, Settings};
 use crate::save::Patience;
-use core::marker::PhantomData;
+use cache_keeper::{CacheKeeper, LoadedCaches};
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
-use halflight_core::findings::{Findings, Value};
+use halflight_core::findings::Findings;
 use halflight_core::light::LightSampler;
-use halflight_core::memory::{Footprint, Line, OutOfMemory};
-use halflight_core::method::cache_resolution::CachedPicture;
-use halflight_core::method::caustics::CausticPathTracing;
+use halflight_core::memory::Line;
+use halflight_core::method::cached_paths::KeptCaches;
 use halflight_core::method::choice::Goal;
-use halflight_core::method::counts::Choice;
-use halflight_core::method::instant_radiosity::InstantRadiosity;
-use halflight_core::method::metropolis::Metropolis;
-use halflight_core::method::photon_map::PhotonMapping;
-use halflight_core::method::sppm::ProgressivePhotonMapping;
-use halflight_core::method::{Method as CoreMethod, PilotSize, RenderContext, rays_per_second};
+use halflight_core::method::{
+    Attempt as CoreAttempt, ChosenMethod, MethodOptions, MethodPlan, MethodSetup, PathOptions, PilotSize,
+    RenderContext, RenderMethod, rays_per_second,
+};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
-use prepared::Prepared;
-
-/// A method to set up, with the decisions of prepasses that have run.
-pub(super) struct Plan<'a, F> {
-    method: Method,
-    /// Method to report: the requested one where path tracing replaces it.
-    reported: Method,
-    /// True if prepasses may choose another method.
-    is_open: bool,
-    /// Path tracing without caustic photons, by its prepass.
-    paths: Option<Box<CausticPathTracing<'a, F>>>,
-    /// Counts of bidirectional techniques.
-    counts: Option<Choice>,
-    /// Prediction of a picture with a cache.
-    picture: Option<CachedPicture>,
-    /// Findings of the prepasses.
-    findings: Findings,
-}
-
-impl<F> From<Method> for Plan<'_, F> {
-    fn from(method: Method) -> Self {
-        let findings = Findings::default();
-        Self { method, reported: method, is_open: false, paths: None, counts: None, picture: None, findings }
-    }
-}
-
-impl<F> Plan<'_, F> {
-    /// Path tracing, unless prepasses predict less error by another method.
-    pub(super) fn open() -> Self {
-        Self { is_open: true, ..Method::Path.into() }
-    }
-
-    /// Path tracing in place of the chosen method of `picture`, which cannot reach the requested error.
-    pub(super) fn instead_of(picture: &RenderResult) -> Self {
-        let mut finding = picture.findings.get("method").copied().unwrap_or_default();
-        finding.topic = "method";
-        finding.reason = "the chosen method cannot reach the requested error: path tracing takes its place";
-        let findings = finding.with("given_up", Value::Name(picture.method.name())).into();
-        Self { findings, ..Method::Path.into() }
-    }
-
-    /// A method with a cache that suits the predicted `picture`.
-    fn with_cache(method: Method, picture: CachedPicture) -> Self {
-        Self { picture: Some(picture), ..method.into() }
-    }
-
-    /// A bidirectional method with the counts of `choice`.
-    fn with_counts(method: Method, choice: Choice) -> Self {
-        Self { counts: Some(choice), findings: choice.findings(), ..method.into() }
-    }
-}
 
 /// Outcome of setting a method up.
 pub(super) enum Attempt<'a, 'm, F> {
     /// The method, with its structures in memory.
     Ready(Box<dyn Renderer + 'm>),
     /// A prepass prefers this plan, for which the memory of the attempt is to be released first.
-    Instead(Box<Plan<'a, F>>),
+    Instead(MethodPlan<'a, F>),
 }
 
 /// Takes memory and sets up the method of `plan`.
 pub(super) fn set_up<'a: 'm, 'm, F: Features>(
-    plan: Plan<'a, F>,
+    plan: MethodPlan<'a, F>,
     setup: &RenderSetup<'a>,
     memory: &mut Memory<'m>,
 ) -> Result<Attempt<'a, 'm, F>, RenderError> {
-    let (context, settings, method) = (&setup.context(), setup.settings, plan.method);
-    let (reported, findings) = (plan.reported, plan.findings);
-    let renderer: Box<dyn Renderer + 'm> = match method {
-        Method::Path => match path::set_up(plan, setup, memory)? {
-            Attempt::Ready(renderer) => renderer,
-            instead => return Ok(instead),
-        },
-        Method::IrradianceCache | Method::RadianceCache => {
-            let picture = plan.picture.or_else(|| setup.cached_picture()).filter(|_| setup.has_open_cache());
-            Box::new(irradiance_cache::Cached::<F>::new((method, picture), setup, memory)?)
-        }
-        Method::PhotonMap => {
-            let scratch = PhotonMapping::<F>::scratch();
-            Adapter::<F, _>::boxed(setup, memory, (method, scratch), |memory, executor, reserve| {
-                PhotonMapping::<F>::new(context, settings.photons, reserve, memory, executor)
-            })?
-        }
-        Method::ProgressivePhotons => {
-            let scratch = ProgressivePhotonMapping::<F>::scratch();
-            Adapter::<F, _>::boxed(setup, memory, (method, scratch), |memory, executor, reserve| {
-                ProgressivePhotonMapping::<F>::new(context, settings.photons, reserve, memory, executor)
-            })?
-        }
-        Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
-            match bidirectional::set_up(plan, setup, memory)? {
-                Attempt::Ready(renderer) => renderer,
-                instead => return Ok(instead),
-            }
-        }
-        Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
-            let form = (method == Method::ClampedInstantRadiosity, settings.reuse);
-            let scratch = InstantRadiosity::<F>::scratch();
-            Adapter::<F, _>::boxed(setup, memory, (method, scratch), |memory, executor, reserve| {
-                let lights = &settings.virtual_lights;
-                InstantRadiosity::<F>::new(context, lights, form, memory, executor, reserve)
-            })?
-        }
-        Method::Metropolis => {
-            let scratch = Metropolis::<F>::scratch();
-            Adapter::<F, _>::boxed(setup, memory, (method, scratch), |memory, executor, reserve| {
-                Metropolis::<F>::new(context, &settings.metropolis, memory, executor, reserve)
-            })?
-        }
-        #[cfg(test)]
-        Method::Wrong => Box::new(wrong::Wrong::<F>::new(setup, memory)?),
+    let loaded = LoadedCaches::open(plan.kind(), setup, memory)?;
+    let core = setup.of_core::<F>(loaded.kept());
+    let mut scratch = memory.take_each("paths", plan.scratch(&core), setup.workers.count())?;
+    #[cfg(test)]
+    if setup.settings.is_wrong {
+        return Ok(Attempt::Ready(Box::new(wrong::Wrong::<F>::new(setup, memory)?)));
+    }
+    let mut executor = Threads::new(setup.workers, &mut scratch);
+    let method = match plan.set_up(&core, memory, &mut executor)? {
+        CoreAttempt::Ready(method) => method,
+        CoreAttempt::Instead(plan) => return Ok(Attempt::Instead(plan)),
     };
-    let renderer: Box<dyn Renderer + 'm> = match findings == Findings::default() {
-        true => renderer,
-        false => Box::new(Prepared { renderer, reported, findings }),
+    let keeper = match method.cached() {
+        Some(_) => Some(CacheKeeper::new::<F>(loaded, setup, memory)?),
+        None => None,
     };
-    Ok(Attempt::Ready(renderer))
+    Ok(Attempt::Ready(Box::new(Threaded { setup: *setup, method, scratch, keeper })))
 }
 
 /// Structures that all methods use.
@@ -183,41 +84,69 @@ impl<'a> RenderSetup<'a> {
         PathIntegrator::new(scene, &bvh, &lights, paths, settings.level)
     }
 
-    /// Rays that the time of the picture allows, if it is limited.
-    pub(super) fn most_rays(&self) -> Option<f64> {
-        let seconds = self.settings.stop.seconds?;
-        let rays = rays_per_second(self.scene.mesh.triangles.len());
-        Some(seconds * self.workers.count() as f64 * rays)
-    }
-
     /// End of the picture.
     pub(super) fn goal(&self) -> Goal {
         let stop = &self.settings.stop;
-        Goal { rays: self.most_rays(), samples: stop.most_samples(), error: stop.error }
-    }
-
-    /// Size of pilots.
-    fn pilots(&self) -> PilotSize {
-        self.goal().rays_alone().map_or(PilotSize::USUAL, PilotSize::of_picture)
-    }
-
-    /// Whether rays and density of records may be chosen: time alone ends the picture, and neither settings
-    /// nor files fix them.
-    pub(super) fn has_open_cache(&self) -> bool {
-        let Settings { cache, load_cache, save_cache, .. } = self.settings;
-        self.goal().rays_alone().is_some() && cache.is_open() && load_cache.is_none() && save_cache.is_none()
-    }
-
-    /// Picture of a requested cache, if its time is limited.
-    fn cached_picture(&self) -> Option<CachedPicture> {
-        Some(CachedPicture::of_time(self.most_rays()? / f64::from(self.settings.shard.count)))
+        let rays = rays_per_second(self.scene.mesh.triangles.len()) * self.workers.count() as f64;
+        let rays = stop.seconds.map(|seconds| seconds * rays);
+        Goal { rays, samples: stop.most_samples(), error: stop.error }
     }
 
     /// Context for methods of the core.
     pub(super) fn context(&self) -> RenderContext<'a> {
         let Self { scene, bvh, lights, settings, .. } = *self;
-        let (paths, pilots) = (path_settings(settings), self.pilots());
+        let pilots = self.goal().rays_alone().map_or(PilotSize::USUAL, PilotSize::of_picture);
+        let paths = path_settings(settings);
         RenderContext { scene, bvh, lights, settings: paths, level: settings.level, pilots }
+    }
+
+    /// Setup of a method of the core, with the records of a file.
+    fn of_core<'s, F: Features>(&self, kept: KeptCaches<'s>) -> MethodSetup<'a, 's> {
+        let settings = self.settings;
+        let keeps_records = settings.save_cache.is_some();
+        MethodSetup {
+            context: self.context(),
+            options: settings.options(),
+            goal: self.goal(),
+            shards: settings.shard.count,
+            reserve: [false, true].map(|is_biased| Audit::bytes::<F>(self, is_biased)),
+            is_audited: settings.audit.unwrap_or(SHARE) > 0.0,
+            kept,
+            widens: !keeps_records,
+            has_fixed_records: settings.load_cache.is_some() || keeps_records,
+        }
+    }
+}
+
+impl Settings {
+    /// Options of all methods.
+    fn options(&self) -> MethodOptions {
+        MethodOptions {
+            paths: PathOptions { reuse: self.reuse, caustics: self.caustics },
+            cache: self.cache,
+            lobes: self.lobes,
+            photons: self.photons,
+            bidirectional: self.bidirectional,
+            virtual_lights: self.virtual_lights,
+            metropolis: self.metropolis,
+        }
+    }
+
+    /// The part of the settings that determines a picture of `method` and of no other, as text.
+    pub(super) fn of_method(&self, method: Method) -> String {
+        match method {
+            Method::Path => String::new(),
+            Method::IrradianceCache => format!(", {:?}", self.cache),
+            Method::RadianceCache => format!(", {:?}, {:?}", self.cache, self.lobes),
+            Method::PhotonMap | Method::ProgressivePhotons => format!(", {:?}", self.photons),
+            Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
+                format!(", {:?}", self.bidirectional)
+            }
+            Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
+                format!(", {:?}", self.virtual_lights)
+            }
+            Method::Metropolis => format!(", {:?}", self.metropolis),
+        }
     }
 }
 
@@ -230,11 +159,6 @@ pub(super) trait Renderer {
     fn chosen(&self) -> Method;
 
     /// One round: brings the tiles of the film to the target, or less if the round is cut.
-    ///
-    /// Sample `n` of a pixel is determined by the scene, the settings, `n`, and the weights stored with a
-    /// film. It does not depend on rounds, on threads, or on earlier runs of a resumed film. Structures
-    /// shared by several pixels are drawn anew for even and odd `n`, or exist twice: the half-films stay
-    /// independent, and their difference estimates all noise.
     ///
     /// # Errors
     /// Insufficient memory.
@@ -260,7 +184,7 @@ pub(super) trait Renderer {
     ///
     /// # Errors
     /// Insufficient memory.
-    fn survey(&mut self, _workers: &Workers) -> Result<Option<Survey>, RenderError> {
+    fn survey(&mut self) -> Result<Option<Survey>, RenderError> {
         Ok(None)
     }
 
@@ -281,48 +205,61 @@ pub(super) trait Renderer {
     }
 
     /// Decisions and numbers of its parts.
-    fn findings(&self) -> Findings;
+    fn findings(&self) -> Findings {
+        Findings::default()
+    }
 }
 
-/// A method with working memory for each thread.
-struct Adapter<'a, F, M> {
-    setup: RenderSetup<'a>,
-    method: M,
+/// A method of the core with working memory for each thread.
+struct Threaded<'m, F> {
+    setup: RenderSetup<'m>,
+    method: ChosenMethod<'m, F>,
     scratch: Vec<Vec<Line>>,
-    chosen: Method,
-    features: PhantomData<F>,
+    /// Keeper of its caches, if it has some.
+    keeper: Option<CacheKeeper<'m>>,
 }
 
-impl<'a, F: Features, M: CoreMethod> Adapter<'a, F, M> {
-    /// The method that `new` makes with `scratch` for each thread, besides the bytes of the audit.
-    fn boxed<'s: 'a>(
-        setup: &RenderSetup<'s>,
-        memory: &mut Memory<'a>,
-        (chosen, scratch): (Method, Footprint),
-        new: impl FnOnce(&mut Memory<'a>, &mut Threads, usize) -> Result<M, OutOfMemory>,
-    ) -> Result<Box<dyn Renderer + 'a>, RenderError>
-    where
-        M: 'a,
-    {
-        let mut scratch = memory.take_each("paths", scratch, setup.workers.count())?;
-        let reserve = Audit::bytes::<F>(setup, chosen.is_biased());
-        let method = new(memory, &mut Threads::new(setup.workers, &mut scratch), reserve)?;
-        Ok(Box::new(Self::with(setup, (chosen, scratch), method)))
-    }
-
-    /// A method that is set up.
-    fn with(setup: &RenderSetup<'a>, (chosen, scratch): (Method, Vec<Vec<Line>>), method: M) -> Self {
-        Self { setup: *setup, method, scratch, chosen, features: PhantomData }
-    }
-}
-
-impl<F: Features, M: CoreMethod> Renderer for Adapter<'_, F, M> {
+impl<F: Features> Renderer for Threaded<'_, F> {
     fn chosen(&self) -> Method {
-        self.chosen
+        self.method.kind
     }
 
     fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
-        Ok(round.run(&mut self.scratch, |round| self.method.round(round))?)
+        let Self { method, scratch, keeper, .. } = self;
+        round.run(scratch, |round| method.round(round))?;
+        if let Some((keeper, cached)) = keeper.as_mut().zip(method.cached()) {
+            keeper.after_round(cached);
+        }
+        Ok(())
+    }
+
+    fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
+        self.method.lend_photons(then)?
+    }
+
+    fn risks(&mut self, workers: &Workers) -> Result<Vec<f32>, RenderError> {
+        let Some(cached) = self.method.cached() else { return Ok(Vec::new()) };
+        let settings = self.setup.settings;
+        let size = [settings.width, settings.height];
+        let mut executor = Threads::new(workers, &mut self.scratch).until(End::Round(None));
+        survey::risks(cached.caching().paths(), cached.caching().caches(), size, &mut executor)
+    }
+
+    fn survey(&mut self) -> Result<Option<Survey>, RenderError> {
+        match self.keeper.as_mut().zip(self.method.cached()) {
+            Some((keeper, cached)) => keeper.survey(cached, &self.setup),
+            None => Ok(None),
+        }
+    }
+
+    fn finish(&mut self, patience: Patience) {
+        if let Some((keeper, cached)) = self.keeper.as_mut().zip(self.method.cached()) {
+            keeper.keep(cached, Some(patience));
+        }
+    }
+
+    fn kept(&self) -> Option<&RewrittenFile<'_>> {
+        self.keeper.as_ref().map(|keeper| &keeper.file)
     }
 
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {

@@ -8,7 +8,6 @@ use crate::render::threads::ThreadedRound;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
-use halflight_core::findings::Findings;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::{Counters, PathIntegrator, path::WAVE};
 
@@ -31,11 +30,7 @@ impl<'a, F: Features> Wrong<'a, F> {
 
 impl<F: Features> Renderer for Wrong<'_, F> {
     fn chosen(&self) -> Method {
-        Method::Wrong
-    }
-
-    fn findings(&self) -> Findings {
-        Findings::default()
+        Method::ClampedInstantRadiosity
     }
 
     fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {

@@ -22,6 +22,7 @@ const LAYERS: &[&str] = &[
     "census",
     "transport",
     "method",
+    "renderer",
 ];
 
 /// Folders and files of core/src/transport, lowest first: subpaths, wavefront, path tracer, and the methods

@@ -28,12 +28,12 @@ macro_rules! vec {
 #[path = "../../../../core/examples/tiny_render.rs"]
 mod example;
 
-use example::{SIZE, fingerprint, render};
+use example::{METHODS as ALL, SIZE, fingerprint, render};
 use halflight_core::Rgb;
 use halflight_core::memory::Line;
 
 /// Number of methods.
-pub const METHODS: usize = example::METHODS.len();
+pub const METHODS: usize = ALL.len();
 
 /// Cache lines that are enough for every method.
 pub const LINES: usize = example::LINES;
@@ -52,7 +52,7 @@ impl<const LINES: usize> Memory<LINES> {
 
     /// The fingerprint of the picture by method number `method`, or 0 where the memory is too small.
     pub fn render(&mut self, method: usize) -> u64 {
-        match render(method, &mut self.lines, &mut self.pixels) {
+        match render(ALL[method], &mut self.lines, &mut self.pixels) {
             Ok(()) => fingerprint(&self.pixels),
             Err(_) => 0,
         }

@@ -1,10 +1,8 @@
-//! Methods and their properties: one row each.
+//! Kinds of methods and their properties: one row each.
 
-use crate::render::Settings;
-
-/// Rendering method.
+/// Kind of a method, without its options.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
+pub enum MethodKind {
     /// Path tracing with next-event estimation and multiple importance sampling.
     Path,
     /// Indirect light of diffuse surfaces from an irradiance cache.
@@ -27,14 +25,11 @@ pub enum Method {
     ClampedInstantRadiosity,
     /// Metropolis light transport.
     Metropolis,
-    /// Deliberately biased path tracing.
-    #[cfg(test)]
-    Wrong,
 }
 
-/// Properties of a method.
+/// Properties of a kind.
 struct Properties {
-    method: Method,
+    kind: MethodKind,
     name: &'static str,
     about: &'static str,
     is_biased: bool,
@@ -43,13 +38,11 @@ struct Properties {
     shares: bool,
     /// True if paths without light paths of their own may be joined with caustic photons.
     may_join_caustics: bool,
-    /// Settings of the method alone, which determine its picture.
-    settings: fn(&Settings) -> String,
 }
 
 /// Most common properties.
 const UNBIASED: Properties = Properties {
-    method: Method::Path,
+    kind: MethodKind::Path,
     name: "",
     about: "",
     is_biased: false,
@@ -57,13 +50,12 @@ const UNBIASED: Properties = Properties {
     finds_caustics: false,
     shares: true,
     may_join_caustics: false,
-    settings: |_| String::new(),
 };
 
-/// Rows in the order of [`Method`].
+/// Rows in the order of [`MethodKind`].
 const TABLE: &[Properties] = &[
     Properties {
-        method: Method::Path,
+        kind: MethodKind::Path,
         name: "path",
         about: "Path tracing with next-event estimation and multiple importance sampling",
         shares: false,
@@ -71,114 +63,95 @@ const TABLE: &[Properties] = &[
         ..UNBIASED
     },
     Properties {
-        method: Method::IrradianceCache,
+        kind: MethodKind::IrradianceCache,
         name: "irradiance-cache",
         about: "Path tracing with interpolated indirect light of diffuse surfaces and bases of coats",
         is_biased: true,
         converges: false,
         may_join_caustics: true,
-        settings: |settings| format!(", {:?}", settings.cache),
         ..UNBIASED
     },
     Properties {
-        method: Method::RadianceCache,
+        kind: MethodKind::RadianceCache,
         name: "radiance-cache",
         about: "irradiance-cache with interpolated light of rough metals and rough coats",
         is_biased: true,
         converges: false,
         may_join_caustics: true,
-        settings: |settings| format!(", {:?}, {:?}", settings.cache, settings.lobes),
         ..UNBIASED
     },
     Properties {
-        method: Method::PhotonMap,
+        kind: MethodKind::PhotonMap,
         name: "photon-map",
         about: "Photon mapping: caustics from photons, indirect light by gather rays that end in a map of \
                 photons",
         is_biased: true,
         converges: false,
         finds_caustics: true,
-        settings: |settings| format!(", {:?}", settings.photons),
         ..UNBIASED
     },
     Properties {
-        method: Method::ProgressivePhotons,
+        kind: MethodKind::ProgressivePhotons,
         name: "sppm",
         about: "Stochastic progressive photon mapping: reflected light from photons, blurred ever less",
         is_biased: true,
         finds_caustics: true,
-        settings: |settings| format!(", {:?}", settings.photons),
         ..UNBIASED
     },
     Properties {
-        method: Method::LightTracing,
+        kind: MethodKind::LightTracing,
         name: "light",
         about: "Path tracing, and light paths whose vertices the camera sees",
-        settings: |settings| format!(", {:?}", settings.bidirectional),
         ..UNBIASED
     },
     Properties {
-        method: Method::Bidirectional,
+        kind: MethodKind::Bidirectional,
         name: "bdpt",
         about: "Bidirectional path tracing with a cache of light vertices",
         // It may fall back to paths.
         may_join_caustics: true,
-        settings: |settings| format!(", {:?}", settings.bidirectional),
         ..UNBIASED
     },
     Properties {
-        method: Method::VertexMerging,
+        kind: MethodKind::VertexMerging,
         name: "vcm",
         about: "Vertex connection and merging: bidirectional path tracing, and photons of caustics behind \
                 mirrors and glass",
         is_biased: true,
         finds_caustics: true,
         may_join_caustics: true,
-        settings: |settings| format!(", {:?}", settings.bidirectional),
         ..UNBIASED
     },
     Properties {
-        method: Method::InstantRadiosity,
+        kind: MethodKind::InstantRadiosity,
         name: "instant-radiosity",
         about: "Virtual point lights, and paths for the light that their bound cuts",
-        settings: |settings| format!(", {:?}", settings.virtual_lights),
         ..UNBIASED
     },
     Properties {
-        method: Method::ClampedInstantRadiosity,
+        kind: MethodKind::ClampedInstantRadiosity,
         name: "instant-radiosity-clamped",
         about: "Virtual point lights with a bounded geometry term: dark corners",
         is_biased: true,
         converges: false,
-        settings: |settings| format!(", {:?}", settings.virtual_lights),
         ..UNBIASED
     },
     Properties {
-        method: Method::Metropolis,
+        kind: MethodKind::Metropolis,
         name: "mlt",
         about: "Metropolis light transport, with path tracing of light that it finds well",
-        settings: |settings| format!(", {:?}", settings.metropolis),
-        ..UNBIASED
-    },
-    #[cfg(test)]
-    Properties {
-        method: Method::Wrong,
-        name: "wrong",
-        is_biased: true,
-        converges: false,
-        shares: false,
         ..UNBIASED
     },
 ];
 
-impl Method {
-    /// All methods.
-    pub const ALL: [Method; TABLE.len() - cfg!(test) as usize] = {
-        let mut all = [Method::Path; TABLE.len() - cfg!(test) as usize];
+impl MethodKind {
+    /// All kinds.
+    pub const ALL: [MethodKind; TABLE.len()] = {
+        let mut all = [MethodKind::Path; TABLE.len()];
         let mut row = 0;
         while row < all.len() {
-            all[row] = TABLE[row].method;
-            assert!(all[row] as usize == row, "rows are in the order of methods");
+            all[row] = TABLE[row].kind;
+            assert!(all[row] as usize == row, "rows are in the order of kinds");
             row += 1;
         }
         all
@@ -198,9 +171,9 @@ impl Method {
         self.properties().about
     }
 
-    /// Method with this name.
-    pub fn named(name: &str) -> Option<Method> {
-        Method::ALL.into_iter().find(|method| method.name() == name)
+    /// Kind with this name.
+    pub fn named(name: &str) -> Option<MethodKind> {
+        MethodKind::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
     /// True if pictures converge to wrong radiance, or are biased until they converge; their noise does not
@@ -225,18 +198,13 @@ impl Method {
         self.properties().shares
     }
 
-    /// The part of `settings` that determines a picture of this method and of no other, as text.
-    pub(in crate::render) fn own_settings(self, settings: &Settings) -> String {
-        (self.properties().settings)(settings)
-    }
-
     /// True if the method has caches of records, which files keep.
     pub const fn has_records(self) -> bool {
-        matches!(self, Method::IrradianceCache | Method::RadianceCache)
+        matches!(self, MethodKind::IrradianceCache | MethodKind::RadianceCache)
     }
 
     /// True if its paths may be joined with caustic photons.
-    pub(in crate::render) const fn may_join_caustics(self) -> bool {
+    pub const fn may_join_caustics(self) -> bool {
         self.properties().may_join_caustics
     }
 }

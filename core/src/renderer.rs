@@ -1,0 +1,118 @@
+//! Renderer of a picture: any method, in the caller's memory, on the caller's threads.
+
+mod error;
+mod of_features;
+mod settings;
+
+pub use error::RenderError;
+pub use of_features::FeatureRenderer;
+pub use settings::{RequiredMemory, Settings, Until};
+
+use crate::Rgb;
+use crate::bsdf::{All, DiffuseTextured, Opaque};
+use crate::census::{Census, FeatureSet};
+use crate::estimate::ErrorEstimate;
+use crate::film::Film;
+use crate::findings::Findings;
+use crate::memory::Arena;
+use crate::method::{Executor, MethodKind};
+use crate::scene::Scene;
+
+/// A picture in progress.
+///
+/// It is made in steps, each of which adds samples. The bits of the picture follow from scene, settings and
+/// number of samples: neither from the steps nor from the threads of the executor.
+///
+/// The scene decides which of three builds of each method runs: for diffuse surfaces, for opaque ones, or for
+/// all. A device with little memory for code has one of them alone by [`FeatureRenderer`].
+pub struct Renderer<'a> {
+    build: Build<'a>,
+}
+
+enum Build<'a> {
+    Diffuse(FeatureRenderer<'a, DiffuseTextured>),
+    Opaque(FeatureRenderer<'a, Opaque>),
+    All(FeatureRenderer<'a, All>),
+}
+
+/// Runs `$work` on the build of a renderer.
+macro_rules! of_build {
+    ($build:expr, $renderer:ident => $work:expr) => {
+        match $build {
+            Build::Diffuse($renderer) => $work,
+            Build::Opaque($renderer) => $work,
+            Build::All($renderer) => $work,
+        }
+    };
+}
+
+impl<'a> Renderer<'a> {
+    /// Memory of a picture of `scene`, before anything is built: of the arena, and of each worker.
+    pub fn required_memory(scene: &Scene, settings: &Settings) -> RequiredMemory {
+        match Census::of(scene).plan().features {
+            FeatureSet::Diffuse => FeatureRenderer::<DiffuseTextured>::required_memory(scene, settings),
+            FeatureSet::Opaque => FeatureRenderer::<Opaque>::required_memory(scene, settings),
+            FeatureSet::All => FeatureRenderer::<All>::required_memory(scene, settings),
+        }
+    }
+
+    /// Builds the hierarchy and the lights of `scene`, runs the pilots of the method and sets it up, all in
+    /// `arena`. The film is black.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`] where `arena` or the scratch of `executor` has less than
+    /// [`Renderer::required_memory`]; others where the picture has no pixel or the mesh is damaged.
+    pub fn new(
+        scene: &'a Scene<'a>,
+        settings: &Settings,
+        arena: &mut Arena<'a>,
+        executor: &mut impl Executor,
+    ) -> Result<Self, RenderError> {
+        let build = match Census::of(scene).plan().features {
+            FeatureSet::Diffuse => Build::Diffuse(FeatureRenderer::new(scene, settings, arena, executor)?),
+            FeatureSet::Opaque => Build::Opaque(FeatureRenderer::new(scene, settings, arena, executor)?),
+            FeatureSet::All => Build::All(FeatureRenderer::new(scene, settings, arena, executor)?),
+        };
+        Ok(Self { build })
+    }
+
+    /// Adds samples `until` the given end, or until the executor is over.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`] where the scratch of `executor` is smaller than that of
+    /// [`Renderer::required_memory`].
+    pub fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
+        of_build!(&mut self.build, renderer => renderer.step(executor, until))
+    }
+
+    /// Error of the picture: noise by the halves of the film, and blur by photons. `None` below four samples
+    /// per pixel and for a black picture.
+    pub fn error(&self) -> Option<ErrorEstimate> {
+        of_build!(&self.build, renderer => renderer.error())
+    }
+
+    /// Mean radiance of each pixel, row by row from the top.
+    pub fn picture(&self) -> impl Iterator<Item = Rgb> + '_ {
+        self.film().rows()
+    }
+
+    /// Sums of the samples, with their halves.
+    pub fn film(&self) -> &Film<'a> {
+        of_build!(&self.build, renderer => renderer.film())
+    }
+
+    /// Samples of the least sampled pixel.
+    pub fn samples(&self) -> u32 {
+        of_build!(&self.build, renderer => renderer.samples())
+    }
+
+    /// The method at work: the one that pilots chose, where it was left open.
+    pub fn method(&self) -> MethodKind {
+        of_build!(&self.build, renderer => renderer.method())
+    }
+
+    /// Decisions and numbers of the parts of the method.
+    pub fn findings(&self) -> Findings {
+        of_build!(&self.build, renderer => renderer.findings())
+    }
+}

@@ -1,0 +1,106 @@
+//! Settings of a picture, the memory that it takes, and the ends of its steps.
+
+use super::RenderError;
+use crate::Level;
+use crate::film::Tile;
+use crate::method::choice::Goal;
+use crate::method::{Method, Shard};
+use crate::transport::{PathSettings, UNLIMITED};
+
+/// Most pixels of a picture.
+const MOST_PIXELS: u64 = 1 << 28;
+
+/// Settings of a picture. [`Settings::new`] has the usual ones.
+///
+/// ```
+/// use halflight_core::{Method, Settings};
+/// let settings = Settings { seed: 7, ..Settings::new([640, 360]) }.with_method(Method::Auto);
+/// assert_eq!(settings.method.name(), "auto");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Method, with its options.
+    pub method: Method,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Most segments of a path; 1 is directly visible light. `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Highest instruction set to use. [`Level::BASELINE`] gives the same bits on every target.
+    pub level: Level,
+    /// Part of the picture to render.
+    pub shard: Shard,
+    /// End of the picture, by which pilots have their sizes and [`Method::Auto`] chooses.
+    pub goal: Goal,
+    /// True if the environment is sampled by visibility tables; `None`: where a pilot finds that they pay.
+    pub environment_visibility: Option<bool>,
+}
+
+impl Settings {
+    /// A picture of `size` pixels by [`Method::Auto`].
+    pub fn new(size: [u32; 2]) -> Self {
+        Self {
+            size,
+            method: Method::Auto,
+            seed: 0,
+            max_depth: None,
+            level: Level::detect(),
+            shard: Shard::WHOLE,
+            goal: Goal::default(),
+            environment_visibility: None,
+        }
+    }
+
+    /// The same by another method.
+    pub fn with_method(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// Settings of its paths.
+    pub(super) fn paths(&self) -> PathSettings {
+        let [width, height] = self.size;
+        PathSettings { width, height, seed: self.seed, max_depth: self.max_depth.unwrap_or(UNLIMITED) }
+    }
+
+    /// # Errors
+    /// [`RenderError::Size`] and [`RenderError::Shard`].
+    pub(super) fn check(&self) -> Result<(), RenderError> {
+        let [width, height] = self.size;
+        if !(1..=MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
+            return Err(RenderError::Size);
+        }
+        let Shard { index, count } = self.shard;
+        match index >= count || count as usize > Tile::count(width, height) {
+            true => Err(RenderError::Shard),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Memory of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RequiredMemory {
+    /// Bytes of the arena for hierarchy, lights, film and the structures of the method in their usual sizes.
+    /// Some of them grow where there is more.
+    pub structures: usize,
+    /// Bytes of working memory of each worker of the executor.
+    pub scratch: usize,
+}
+
+impl RequiredMemory {
+    /// Bytes of an arena that holds the working memory of so many workers as well.
+    pub fn with_workers(&self, workers: usize) -> usize {
+        self.scratch.saturating_mul(workers).saturating_add(self.structures)
+    }
+}
+
+/// End of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Until {
+    /// Samples of each pixel, those of earlier steps included.
+    Samples(u32),
+    /// Upper end of the interval of the error, relMSE.
+    Error(f64),
+}
