@@ -1,5 +1,5 @@
 //! Audit of a picture: the unbiased path tracer renders some of its pixels as well, in step with the picture.
-//! Their difference beyond noise is bias (docs/decisions/0011).
+//! Their difference beyond noise is bias (docs/decisions/bias-audit.md).
 
 mod choice;
 mod shards;
