@@ -8,8 +8,6 @@ pub mod bidirectional;
 pub mod cache_resolution;
 pub mod caustics;
 pub mod choice;
-#[cfg(test)]
-mod closed_box;
 pub mod counts;
 pub mod emission_guide;
 pub mod environment_visibility;
@@ -27,6 +25,8 @@ pub mod record_placement;
 pub mod round;
 mod splats;
 pub mod sppm;
+#[cfg(test)]
+mod test_box;
 pub mod view_placement;
 
 /// Rays per second and thread in a scene of few triangles. No clock is read.

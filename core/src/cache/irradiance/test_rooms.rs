@@ -139,7 +139,7 @@ impl Room {
     }
 
     /// Radiance, distance and normal of the hit of direction `w` from the floor.
-    pub(super) fn look(&self, [x, y]: [f64; 2], w: Point) -> (f64, f64, Point) {
+    pub(super) fn trace(&self, [x, y]: [f64; 2], w: Point) -> (f64, f64, Point) {
         let inside = |low: [f64; 2], side: f64, t: f64| {
             let at = [x + t * w[0] - low[0], y + t * w[1] - low[1]];
             at.iter().all(|c| (0.0..side).contains(c))
@@ -203,12 +203,12 @@ pub(super) struct Gather {
 }
 
 impl Gather {
-    pub(super) fn new(n: usize, random: &mut Random, look: impl Fn(Point) -> (f64, f64, Point)) -> Self {
+    pub(super) fn new(n: usize, random: &mut Random, trace: impl Fn(Point) -> (f64, f64, Point)) -> Self {
         let (mut radiance, mut inverse, mut directions, mut normals) = (vec![], vec![], vec![], vec![]);
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let u = [j, i].map(|k| ((k as f64 + random.unit()) / n as f64) as f32);
             let w = crate::sampling::warp::cosine_hemisphere(u).to_array();
-            let (light, distance, normal) = look(w.map(f64::from));
+            let (light, distance, normal) = trace(w.map(f64::from));
             radiance.push([light as f32; 3]);
             inverse.push((1.0 / distance) as f32);
             directions.push(w);

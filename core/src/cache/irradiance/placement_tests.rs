@@ -1,7 +1,7 @@
 //! Comparison of metrics with equal numbers of records, on the floor of rooms with known irradiance: records
 //! are gathered in random order wherever none is valid, and interpolation is compared with the truth.
 
-use super::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
+use super::test_rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
 use super::{Derivatives, IrradianceCache, Metric, QueryPoint, Record, metric, validity};
 use crate::Level;
 use crate::geometry::{Bounds, Frame};
@@ -35,7 +35,7 @@ impl Floor {
         let (mut derivatives, mut noise) = (vec![vec![]; metrics.len()], vec![]);
         with_tables(STRATA, |tables| {
             for &place in &places {
-                let gather = Gather::new(STRATA, &mut random, |w| room.look(place, w));
+                let gather = Gather::new(STRATA, &mut random, |w| room.trace(place, w));
                 let irradiance = luminance(gather.hemisphere().irradiance());
                 noise.push(gather.hemisphere().variance() / (irradiance * irradiance));
                 for (metric, derivatives) in metrics.iter().zip(&mut derivatives) {
