@@ -21,8 +21,9 @@ pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output
 }
 
 /// A register of f32 lanes.
-pub trait Lanes:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+where
+    Self: Div<Output = Self> + Neg<Output = Self>,
 {
     /// `[f32; N]`.
     type Array: Copy;

@@ -127,9 +127,9 @@ fn calibrate(file: &Path, wanted: &Wanted) {
     let mut samples: Vec<f64> = results.iter().map(|result| f64::from(result.spp)).collect();
     let mut seconds: Vec<f64> = results.iter().map(|result| result.seconds.render).collect();
     println!(
-        "  {name}, {size} x {size}, stopped at {wanted}: error / wanted {:.2}, {:.2}, {:.2}; within a factor of 1.5 in {near} \
-         of {renders}, above in {above}; {} samples, {:.2} s (medians), not reached by {most} in {late}; reference of {} \
-         samples, relMSE {noise:.1e}",
+        "  {name}, {size} x {size}, stopped at {wanted}: error / wanted {:.2}, {:.2}, {:.2}; within a \
+         factor of 1.5 in {near} of {renders}, above in {above}; {} samples, {:.2} s (medians), not reached \
+         by {most} in {late}; reference of {} samples, relMSE {noise:.1e}",
         quantile(&mut ratios, 0.03),
         quantile(&mut ratios, 0.5),
         quantile(&mut ratios, 0.97),

@@ -411,8 +411,8 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     );
     let mut memory = all.arena();
     let plain = EmissionSampler::build(&scene, &lights, &bvh.bounds(), &mut memory).unwrap();
-    let mut worth = GuideStats::aimed(&scene, &lights, &plain, &mut memory).unwrap().unwrap();
-    let aimed = worth.guide(&plain, &mut memory).unwrap();
+    let mut stats = GuideStats::aimed(&scene, &lights, &plain, &mut memory).unwrap().unwrap();
+    let aimed = stats.guide(&plain, &mut memory).unwrap();
     let mut scratch_memory = TestArena::new(CausticPhotonTracer::<All>::scratch());
     let mut scratch = scratch_memory.arena();
     const TASKS: usize = 64;
@@ -437,10 +437,10 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
             samples.iter().for_each(|sample| stats.learn(sample.cell, sample.benefit));
         }
     };
-    learn(&aimed, 0, &mut worth, &mut scratch);
-    let once = worth.guide(&plain, &mut memory).unwrap();
-    learn(&once, 1, &mut worth, &mut scratch);
-    let learned = worth.guide(&plain, &mut memory).unwrap();
+    learn(&aimed, 0, &mut stats, &mut scratch);
+    let once = stats.guide(&plain, &mut memory).unwrap();
+    learn(&once, 1, &mut stats, &mut scratch);
+    let learned = stats.guide(&plain, &mut memory).unwrap();
     assert_eq!(memory.available(), 0, "footprints are exact");
     assert!(GuideStats::aimed(&scene, &lights, &plain, &mut memory).is_err());
 

@@ -80,9 +80,8 @@ fn a_factor_of_0_does_not_hide_its_own_map() {
     assert_eq!(maya.repairs.len(), 2, "{:?}", maya.repairs);
     // A missing map leaves the constant value.
     let gone = material("Kd 0 0 0\nmap_Kd gone.bmp");
-    assert!(
-        matches!(gone.materials[0].surface, Surface::Diffuse { reflectance } if reflectance.value == Rgb::ZERO)
-    );
+    let surface = gone.materials[0].surface;
+    assert!(matches!(surface, Surface::Diffuse { reflectance } if reflectance.value == Rgb::ZERO));
 }
 
 #[test]

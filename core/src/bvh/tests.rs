@@ -347,11 +347,11 @@ fn on_a_floor_of_many_triangles_a_survey_sees_it_all_but_at_the_edge_and_under_a
     let bvh = Bvh::build(&soup.mesh(), &mut Arena::over(&mut memory)).unwrap();
     let frame = Frame { tangent: Vec3::X, bitangent: Vec3::NEG_Z, normal: Vec3::Y };
     let points = [[0.9, -0.9, 0.9, -0.9, 0.9, -0.9, 0.9, -0.9], [0.8; POINTS]];
-    let look = |x: f32| {
+    let at_x = |x: f32| {
         let place = Vec3::new(x, 1e-3, 4.3);
         bvh.clearance(&ClearanceQuery { place, frame, reach: 1.0, points, depth: 0.1 })
     };
-    assert_eq!(look(5.3), Clearance::OPEN);
-    assert_eq!(look(7.3), Clearance { has_wall: false, has_overhang: false, surface: 0xaa });
-    assert!([2.7, 1.3].map(look).iter().all(|clearance| clearance.has_wall && !clearance.has_overhang));
+    assert_eq!(at_x(5.3), Clearance::OPEN);
+    assert_eq!(at_x(7.3), Clearance { has_wall: false, has_overhang: false, surface: 0xaa });
+    assert!([2.7, 1.3].map(at_x).iter().all(|clearance| clearance.has_wall && !clearance.has_overhang));
 }

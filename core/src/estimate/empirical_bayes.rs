@@ -2,7 +2,7 @@
 //! statistics"). A class holds the pixels that, in one pair of their quarters, exceed their neighbours by a
 //! certain factor and disagree by a certain degree. The share of this excess that the *other* pair confirms
 //! is believed. A firefly that no other sample meets shrinks to its neighbours; texture stays. Reasons:
-//! docs/decisions/0035.
+//! docs/decisions/error-estimate.md.
 
 use super::metric::RELMSE_OFFSET;
 use super::tile_statistics::{DARK_OFFSET, TileStatistics, brightness};

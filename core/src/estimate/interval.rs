@@ -1,4 +1,4 @@
-//! Error of a picture from itself: relMSE and its 95 % interval (docs/decisions/0009, 0035).
+//! Error of a picture from itself: relMSE and its 95 % interval (docs/decisions/error-estimate.md).
 //!
 //! The plain algorithm: half-films A and B are independent and unbiased, so that ((A − B) / 2)² has the
 //! variance of their mean I as mean; its mean over pixels, over I² + 0.01 m², is the relMSE. Departures:

@@ -27,7 +27,7 @@ pub const LEAST_PIXELS: f32 = 2.0;
 
 /// The fraction of the time that is left before both caches are filled in which each is to be filled: both
 /// are cut alike. Points that no record reaches by then are path traced. A smaller fraction leaves more to
-/// paths where filling is slow: 0.12 has 1.7 times the error in a room behind a door.
+/// paths where filling is slow (docs/decisions/cache-time.md#deadline).
 const TIME: f32 = 0.18;
 
 /// The same for the view-bound records of both halves, of the time that is left then.

@@ -10,8 +10,6 @@ pub mod cache_resolution;
 pub mod cached_paths;
 pub mod caustics;
 pub mod choice;
-#[cfg(test)]
-mod closed_box;
 pub mod counts;
 pub mod emission_guide;
 pub mod environment_visibility;
@@ -32,21 +30,10 @@ pub mod round;
 pub mod setup;
 mod splats;
 pub mod sppm;
+#[cfg(test)]
+mod test_box;
 pub mod view_placement;
-
-/// Rays per second and thread in a scene of few triangles. No clock is read.
-const RAYS_PER_SECOND: f64 = 6e6;
-
-/// Work in a scene with this number of `triangles` relative to one with few: its hierarchy is deeper, and its
-/// surfaces have more detail. By seconds, measured on 24 scenes of 36 to 383,000 triangles.
-pub fn work_of_detail(triangles: usize) -> f64 {
-    1.0 + libm::log2(1.0 + triangles as f64 / 4096.0) / 3.0
-}
-
-/// Rays per second and thread by which a time limit becomes work in a scene with this number of `triangles`.
-pub fn rays_per_second(triangles: usize) -> f64 {
-    RAYS_PER_SECOND / work_of_detail(triangles)
-}
+mod work;
 
 pub use crate::cache::radiance::LobeSettings;
 pub use any::{AnyMethod, ChosenMethod};
@@ -61,6 +48,7 @@ pub use photons::{MapUse, PhotonSettings, PhotonUse};
 pub use pilot::PilotSize;
 pub use round::{RenderState, Round, Shard};
 pub use setup::{Attempt, MethodPlan, MethodSetup};
+pub use work::{rays_per_second, work_of_detail};
 
 use crate::Level;
 use crate::bsdf::Features;

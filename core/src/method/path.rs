@@ -12,7 +12,7 @@ use crate::transport::{PathIntegrator, PathReuse, Pilot, path::WAVE};
 /// Use of path reuse among neighbouring pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reuse {
-    /// They do.
+    /// True if neighbouring pixels share paths.
     pub used: bool,
     /// Samples of a few tiles with reuse and without; `None` where the caller has decided.
     pub pilot: Option<Pilot>,

@@ -177,7 +177,7 @@ impl<F: Features> ViewPlacement<'_, '_, F> {
                 builder.end_sweep();
                 continue;
             }
-            let Some(mut end) = self.look(&order, builder, executor, &mut counters)? else {
+            let Some(mut end) = self.missing_points(&order, builder, executor, &mut counters)? else {
                 return Ok(Passed { counters, is_complete: false });
             };
             let mut first = 0;
@@ -198,7 +198,7 @@ impl<F: Features> ViewPlacement<'_, '_, F> {
 
     /// Finds the points of the next step that no record covers, and returns their number; `None` if the
     /// executor ends it early.
-    fn look(
+    fn missing_points(
         &mut self,
         order: &ProgressiveOrder,
         builder: &ViewBuilder,

@@ -11,7 +11,7 @@
 //!
 //! The same traversal also estimates the density over finer discs, of half the radius and less. They serve
 //! places where photons are dense, and they show the blur of the whole disc
-//! (`docs/decisions/0043-density-bias.md`).
+//! (`docs/decisions/photon-discs.md`).
 
 use super::PhotonMap;
 use super::kernel::{Kernel, QueryDisc};

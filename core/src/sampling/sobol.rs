@@ -6,7 +6,7 @@
 //! independent of each other (padding), and their number is unlimited.
 //!
 //! Even and odd samples of a pixel come from two such sequences with different keys: independent replicates,
-//! which the estimate of their mean's error requires (docs/decisions/0009).
+//! which the estimate of their mean's error requires (docs/decisions/error-estimate.md).
 //!
 //! Departures from the paper:
 //! 1. The Laine-Karras hash has Vegdahl's constants (2021, "Building a Better LK Hash"), which approximate a

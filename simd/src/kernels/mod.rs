@@ -1,5 +1,6 @@
-//! Batch kernels of ray traversal, of coefficients and derivatives of incident light, and of photon maps,
-//! each with a scalar reference.
+//! Batch kernels, each with a scalar reference: ray traversal ([`boxes`], [`triangles`], [`push`]), shading
+//! of sixteen vertices ([`shade`]), coefficients and derivatives of incident light ([`cells`], [`mesh`],
+//! [`edge`], [`jumps`], [`outer`], [`dots`], [`eigen`]), and photon maps ([`points`], [`select`]).
 
 pub mod boxes;
 pub mod cells;

@@ -1,5 +1,5 @@
 //! Meaning of MTL statements: from [`MtlMaterial`] to the core's [`Material`], by the conventions of
-//! `docs/loading.md`. `docs/decisions/0002-plastic-from-mtl.md` explains the conventions for plastics.
+//! `docs/loading.md`. `docs/decisions/loading.md` explains the conventions for plastics.
 
 mod inputs;
 

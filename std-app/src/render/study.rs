@@ -71,27 +71,27 @@ const PASSES: i32 = 3;
 /// Gatherings at each held-out point.
 const REPEATS: u32 = 4;
 
-/// Runs `study` on the picture of `settings` and calls `tell` after each metric.
+/// Runs `study` on the picture of `settings` and calls `report` after each metric.
 pub fn study_irradiance(
     scene: &Scene,
     settings: &Settings,
     study: &IrradianceStudy,
-    tell: &mut dyn FnMut(&MetricError),
+    report: &mut dyn FnMut(&MetricError),
 ) -> Result<(), RenderError> {
     // One build suffices for a study.
-    Study { scene, settings, study, tell }.run::<All>()
+    Study { scene, settings, study, report }.run::<All>()
 }
 
 struct Study<'a> {
     scene: &'a Scene<'a>,
     settings: &'a Settings,
     study: &'a IrradianceStudy,
-    tell: &'a mut dyn FnMut(&MetricError),
+    report: &'a mut dyn FnMut(&MetricError),
 }
 
 impl Study<'_> {
     fn run<F: Features>(self) -> Result<(), RenderError> {
-        let Study { scene, settings, study, tell } = self;
+        let Study { scene, settings, study, report } = self;
         let workers = Workers::new(settings.threads)?;
         let bank = Bank::new();
         let mut memory = Memory::new(scene, settings, &bank);
@@ -146,7 +146,7 @@ impl Study<'_> {
                 }
                 let error = search.error;
                 if search.is_done(builder.cache.records().len() as u64) {
-                    tell(&judge(metric, error, &builder.cache, &points));
+                    report(&judge(metric, error, &builder.cache, &points));
                     break;
                 }
             }

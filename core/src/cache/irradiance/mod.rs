@@ -28,6 +28,6 @@ pub use store::{CachedIrradiance, GREATEST_DEVIATION, IrradianceCache};
 pub use validity::{Validity, validity, validity_with_lobe};
 
 #[cfg(test)]
-mod placement;
+mod placement_tests;
 #[cfg(test)]
-mod rooms;
+mod test_rooms;

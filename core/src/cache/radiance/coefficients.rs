@@ -66,7 +66,7 @@ impl Coefficients {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cache::radiance::rooms::{Sky, with_tables};
+    use crate::cache::radiance::test_rooms::{Sky, with_tables};
     use crate::cache::radiance::zernike::{DEGREE_MAX, index};
 
     /// L = 1 + s·w: E = π + 2π/3 s_z, degree 1 = s √π/2, and with P_j of Legendre ∫ z Z_{2j,0} dx dy =

@@ -14,12 +14,12 @@ pub mod lobes;
 mod mirror;
 mod pool;
 mod record_coefficients;
-#[cfg(test)]
-mod rooms;
 mod served;
 pub mod sh;
 mod strata;
 mod tables;
+#[cfg(test)]
+mod test_rooms;
 pub mod zernike;
 
 pub use basis::{Basis, Representation};
@@ -34,4 +34,4 @@ pub use tables::GatherTables;
 pub(crate) use tables::Projection;
 
 #[cfg(test)]
-pub(in crate::cache) use rooms::Sky;
+pub(in crate::cache) use test_rooms::Sky;

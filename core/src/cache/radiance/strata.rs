@@ -148,7 +148,7 @@ fn mean(degree: usize, points: impl ExactSizeIterator<Item = [f32; 2]>, row: &mu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cache::radiance::rooms::with_tables;
+    use crate::cache::radiance::test_rooms::with_tables;
     use crate::memory::Line;
     use core::f64::consts::PI;
     use std::vec;

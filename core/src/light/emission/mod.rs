@@ -329,7 +329,7 @@ mod tests {
     }
 
     /// Mean power of photons; calls `look` with each.
-    fn mean_power(scene: &Scene, mut look: impl FnMut(&EmissionSample)) -> Rgb {
+    fn mean_power(scene: &Scene, mut visit: impl FnMut(&EmissionSample)) -> Rgb {
         const PHOTONS: u32 = 1 << 16;
         let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
         let bytes = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
@@ -343,7 +343,7 @@ mod tests {
         for photon in 0..PHOTONS {
             let sampler = Sampler::replicate(5, 1, 0, photon);
             if let Some(emitted) = emission.emit(scene, &lights, &sampler) {
-                look(&emitted);
+                visit(&emitted);
                 sum.iter_mut()
                     .zip(emitted.power.to_array())
                     .for_each(|(sum, power)| *sum += f64::from(power));

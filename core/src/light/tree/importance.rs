@@ -2,7 +2,8 @@
 //! (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", section
 //! 4). The same code evaluates one group or eight, with equal bits.
 //!
-//! Departure: cosines are averaged over a group, whereas the paper takes their maximum (docs/decisions/0059).
+//! Departure: cosines are averaged over a group, whereas the paper takes their maximum
+//! (docs/decisions/lights.md).
 
 use crate::geometry::{Bounds, Cone};
 use bytemuck::{Pod, Zeroable};

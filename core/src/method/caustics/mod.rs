@@ -49,12 +49,12 @@ pub fn are_possible(scene: &Scene) -> bool {
 /// Use of caustic photons beside paths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CausticUse {
-    /// They were.
+    /// True if photons are merged into paths.
     pub used: bool,
     /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None`
     /// without a prepass.
     pub share: Option<f64>,
-    /// There was not enough memory for a prepass.
+    /// True if memory was too short for a prepass.
     pub lacks_memory: bool,
 }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::bsdf::DiffuseOnly;
 use crate::cache::irradiance::Metric;
 use crate::memory::{Buffer, Line};
-use crate::method::closed_box::{SIDE, cornell, furnace, with_box};
+use crate::method::test_box::{SIDE, cornell, furnace, with_box};
 use crate::method::{Loop, RenderState, Shard};
 use crate::scene::Material;
 use std::vec;

@@ -145,7 +145,9 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
                 continue;
             }
             let is_missing = |point: &GatherPoint| !builder.is_served(point, least_pixels);
-            let Some(mut end) = self.look(builder.next, target, &is_missing, executor, &mut counters)? else {
+            let Some(mut end) =
+                self.missing_points(builder.next, target, &is_missing, executor, &mut counters)?
+            else {
                 return Ok(Passed { counters, is_complete: false });
             };
             let mut first = 0;
@@ -206,7 +208,9 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         let target = (builder.index, Via::Specular);
         let least_pixels = self.least_pixels;
         let is_open = move |point: &GatherPoint| !point.is_confined(least_pixels);
-        let Some(count) = self.look(first, target, &is_open, executor, counters)? else { return Ok(1.0) };
+        let Some(count) = self.missing_points(first, target, &is_open, executor, counters)? else {
+            return Ok(1.0);
+        };
         let points = self.step.get(..count).unwrap_or_default();
         let mut factors = [f32::INFINITY; STEP];
         let tasks = points.chunks(PIXELS).zip(factors.chunks_mut(PIXELS));
@@ -230,7 +234,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
 
     /// Finds the points of the step that begins with pixel `first` of the order, as far as they are wanted,
     /// and returns their number; `None` where the executor ends it early.
-    fn look(
+    fn missing_points(
         &mut self,
         first: u64,
         target: (u32, Via),

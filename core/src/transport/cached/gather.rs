@@ -26,8 +26,8 @@ use glam::Vec3;
 /// Offset of the pixel numbers of gathers, beyond those of any picture.
 pub(in crate::transport) const NO_PIXEL: u32 = 1 << 30;
 
-/// Minimum strata along a side for packets. With fewer, the rays of a block diverge, and packets cost a
-/// quarter of the time of a record in Sponza with 16, a tenth with 32.
+/// Minimum strata along a side for packets. With fewer, the rays of a block diverge
+/// (docs/decisions/photon-map.md#harmonic-mean).
 const NARROW: usize = 64;
 
 /// Settings of gathering.

@@ -12,10 +12,10 @@
 //! sees x, the three densities share all factors of the path behind x. Otherwise the third is computed as if
 //! photons were gathered at x. A diffuse surface keeps the ratio of densities for kernels of equal size, and
 //! weights are right as long as all techniques use the same. Photons are not gathered at x itself: a camera
-//! path that meets x by chance would be a firefly (`docs/decisions/0042-photons-past-the-first-receiver.md`).
+//! path that meets x by chance would be a firefly (`docs/decisions/caustic-photons.md`).
 //! A kernel much smaller than the one where their light was scattered last, as close to the camera, gathers
 //! none either: each photon would be a firefly. Camera and light paths both know the two kernels, and
-//! hence the merging vertex (`docs/decisions/0045-kernel-radii.md`). With étendue instead of areas
+//! hence the merging vertex (`docs/decisions/caustic-photons.md`). With étendue instead of areas
 //! (`light/emission/pdf.rs`) distances cancel, and the third density over the first is
 //!
 //!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
@@ -32,7 +32,7 @@
 //!
 //! A diffuse surface under a narrow coat counts as two: its base is a receiver, its coat a caster like rough
 //! metal. Camera and light paths choose one of them at each such surface
-//! (`docs/decisions/0069-coats-as-layers.md`).
+//! (`docs/decisions/bsdfs.md`).
 //!
 //! With an irradiance cache, records supply light that a rough surface, metal included, sent to a point.
 //! Photons supply light that came straight from a mirror or smooth glass. A light path that meets two rough

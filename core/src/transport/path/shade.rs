@@ -1,6 +1,6 @@
-//! Shading of a block of vertices in textbook order, step by step for the whole block: escape and emission,
-//! light of the estimator, next-event estimation (`direct.rs`), next direction by BSDF sampling and Russian
-//! roulette.
+//! Shading vertex by vertex: at levels without lanes, and the reference of `lanes`, whose kernels shade a
+//! block of sixteen. The steps are in textbook order for the whole block: escape and emission, light of the
+//! estimator, next-event estimation (`direct.rs`), next direction by BSDF sampling and Russian roulette.
 
 use super::PathIntegrator;
 use super::estimator::{EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight};

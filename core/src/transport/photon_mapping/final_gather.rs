@@ -307,7 +307,7 @@ mod tests {
     /// Tests `light` on both sides of the wall.
     fn check(light: &GlobalMapLookup, tracer: (&Bvh, Level), random: Random) {
         let material = Material::diffuse(Rgb::ONE);
-        let ask = |x: f32, y: f32| {
+        let query = |x: f32, y: f32| {
             let point = SurfacePoint {
                 position: Vec3::new(x, y, 0.0),
                 error: 1e-7,
@@ -321,7 +321,7 @@ mod tests {
             light.irradiance(tracer, &point, 100.0).map(|(irradiance, _)| irradiance.x)
         };
         let in_light: Vec<_> = (0..4000)
-            .filter_map(|i| ask(0.1 + 0.3 * random.single(i), 0.1 + 0.8 * random.single(4000 + i)))
+            .filter_map(|i| query(0.1 + 0.3 * random.single(i), 0.1 + 0.8 * random.single(4000 + i)))
             .collect();
         let count = in_light.len() as f32;
         let mean = in_light.iter().sum::<f32>() / count;
@@ -329,7 +329,7 @@ mod tests {
         // The nearest irradiance alone scatters by 0.15.
         assert!(count > 3000.0 && (mean - 1.0).abs() < 0.025 && scatter < 0.13, "{count} {mean} {scatter}");
         let in_shade: Vec<_> = (0..4000)
-            .filter_map(|i| ask(0.501 + 0.1 * random.single(i), 0.1 + 0.8 * random.single(4000 + i)))
+            .filter_map(|i| query(0.501 + 0.1 * random.single(i), 0.1 + 0.8 * random.single(4000 + i)))
             .collect();
         let most = in_shade.iter().fold(0.0, |most: f32, &e| most.max(e));
         assert!(in_shade.len() > 1000 && most < 0.25, "{} {most}", in_shade.len());

@@ -20,8 +20,7 @@ use crate::level::{Kernel, Level};
 use core::f32::consts::FRAC_1_PI;
 
 /// Weight of the coat over the base in the choice of the lobe. Light samples find the emitters that the base
-/// reflects, whereas the coat has to find its reflections alone. In a room whose floor mirrors its windows a
-/// weight of 2 lowers the variance of the floor by a seventh, 3.5 by a fifth.
+/// reflects, whereas the coat has to find its reflections alone (docs/decisions/bsdfs.md#choice-of-the-coat).
 pub const COAT_WEIGHT: f32 = 2.0;
 
 /// Coats of a block.

@@ -15,7 +15,7 @@ use core::f32::consts::FRAC_1_PI;
 
 /// Throughput from which a path survives with certainty; below, the probability is proportional to it. There
 /// is no minimum number of segments: early ends of dark paths save the most time
-/// (docs/decisions/0023-russian-roulette.md).
+/// (docs/decisions/sampling.md).
 pub const CERTAIN_FROM: f32 = 0.25;
 
 /// BSDF sampling of a block.

@@ -1,5 +1,5 @@
 //! Audit of a picture: the unbiased path tracer renders some of its pixels as well, in step with the picture.
-//! Their difference beyond noise is bias (docs/decisions/0011).
+//! Their difference beyond noise is bias (docs/decisions/bias-audit.md).
 
 mod choice;
 mod shards;
@@ -41,10 +41,12 @@ const MAX_RUN_SECONDS: f64 = 0.25;
 /// Makes the audit's random numbers differ from those of the picture.
 const AUDIT_SEED: u32 = 0x5eed_a0d1;
 
+/// Counters of path-traced samples.
+type Traced = Result<Counters, OutOfMemory>;
+
 /// Path-traced samples of single pixels, merged with caustic photons if given.
-type PixelTracer<'a> = dyn Fn(Samples, Option<CausticMerging>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory>
-    + Sync
-    + 'a;
+type PixelTracer<'a> =
+    dyn Fn(Samples, Option<CausticMerging>, &mut Arena, &mut [Pixel]) -> Traced + Sync + 'a;
 
 /// Pixels as column and row, and the range of their samples.
 type Samples<'s> = (&'s [[u32; 2]], Range<u32>);

@@ -332,8 +332,8 @@ fn relative(points: &[Point], found: impl Fn(&Point) -> f64) -> f64 {
     (squares / count).sqrt() / mean
 }
 
-/// Errors of all rules in all rooms; calls `tell` after each.
-pub(super) fn errors(tell: &mut dyn FnMut(&RadianceMetricError)) -> Result<(), OutOfMemory> {
+/// Errors of all rules in all rooms; calls `report` after each.
+pub(super) fn errors(report: &mut dyn FnMut(&RadianceMetricError)) -> Result<(), OutOfMemory> {
     let mut buffers = Buffers::new()?;
     let tables = Tables::new(&mut buffers)?;
     for (name, room) in ["box", "sun", "columns"].into_iter().zip(Room::all()) {
@@ -353,7 +353,7 @@ pub(super) fn errors(tell: &mut dyn FnMut(&RadianceMetricError)) -> Result<(), O
                 ((0..ORDERS).map(of_order).sum::<f64>() / ORDERS as f64).sqrt()
             });
             let own = relative(&points, |point| point.own[number]);
-            tell(&RadianceMetricError { room: name, basis, rule, errors, own });
+            report(&RadianceMetricError { room: name, basis, rule, errors, own });
         }
     }
     Ok(())

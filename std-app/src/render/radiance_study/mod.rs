@@ -25,19 +25,19 @@ pub fn study_bases() -> Result<Vec<BasisError>, RenderError> {
     Ok(bases::errors()?)
 }
 
-/// Errors of derivatives in every room with each number of strata along a side; calls `tell` after each.
-pub fn study_gradients(strata: &[usize], tell: &mut dyn FnMut(&GradientError)) -> Result<(), RenderError> {
+/// Errors of derivatives in every room with each number of strata along a side; calls `report` after each.
+pub fn study_gradients(strata: &[usize], report: &mut dyn FnMut(&GradientError)) -> Result<(), RenderError> {
     for room in &gradients::ROOMS {
         for &strata in strata {
-            tell(&gradients::errors(room, strata)?);
+            report(&gradients::errors(room, strata)?);
         }
     }
     Ok(())
 }
 
-/// Errors between records by error metrics at equal numbers of records; calls `tell` after each.
-pub fn study_radiance_metrics(tell: &mut dyn FnMut(&RadianceMetricError)) -> Result<(), RenderError> {
-    Ok(metrics::errors(tell)?)
+/// Errors between records by error metrics at equal numbers of records; calls `report` after each.
+pub fn study_radiance_metrics(report: &mut dyn FnMut(&RadianceMetricError)) -> Result<(), RenderError> {
+    Ok(metrics::errors(report)?)
 }
 
 /// Floor of the box between 150 records: errors by split-sphere on the left, by the larger Hessian on the

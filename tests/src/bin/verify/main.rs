@@ -6,6 +6,9 @@
 mod command;
 mod fuzz;
 mod layers;
+mod limits;
+mod names;
+mod pages;
 mod quality;
 mod source;
 mod targets;

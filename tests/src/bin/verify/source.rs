@@ -1,7 +1,9 @@
-//! House rules that no compiler checks, verified line by line in the source.
+//! House rules that no compiler checks, verified line by line in sources and pages.
 
 use crate::layers::{self, Source};
-use crate::{Failure, Outcome, Project};
+use crate::pages::{self, Text};
+use crate::{Failure, Outcome, Project, limits, names};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -57,72 +59,78 @@ const RULES: &[Rule] = &[
     },
 ];
 
-/// Most lines of a file.
-const MAX_LINES: usize = 600;
+/// Folders that hold products, corpora, and pictures of runs.
+const LEFT_OUT: &[&str] = &["target", "corpus", "artifacts", "venv", "output", ".git", "__pycache__"];
 
-/// Most lines of a file of the core, unit tests included; then the files that still exceed it.
-const MAX_CORE_LINES: usize = 400;
-const LONG_FILES: &[&str] =
-    &["core/src/cache/octree.rs", "core/src/light/emission/mod.rs", "core/src/photon/tests.rs"];
+/// Ends of the names of files that are read.
+const TEXTS: &[&str] = &[".rs", ".md", ".py", ".toml"];
 
-/// Most lines of a function of the core; then the exceptions: a kernel, and the textbook path tracer, which
-/// is read as a whole.
-const MAX_FUNCTION_LINES: usize = 80;
-const LONG_FUNCTIONS: &[&str] =
-    &["core/src/bvh/stream.rs: trace", "core/src/transport/path/reference.rs: radiance"];
+/// A file that is read: its path from the root, and its text.
+struct File {
+    name: String,
+    path: PathBuf,
+    text: String,
+}
 
-/// Most columns of a line, comments included, which rustfmt does not wrap.
-const COLUMNS: usize = 110;
-
-/// Code whose lines have at most [`COLUMNS`] columns. Elsewhere that holds for comments: strings and tables
-/// of tests stay whole.
-const NARROW: &[&str] = &["core/src", "tests/src/bin/verify/layers.rs"];
+impl File {
+    fn text(&self) -> Text<'_> {
+        (&self.name, &self.text)
+    }
+}
 
 /// Folders of tests, each with the program that has their files as modules.
 const TEST_PROGRAMS: [(&str, &str); 2] =
     [("tests/tests/", "tests/tests/main.rs"), ("std-app/tests/", "std-app/tests/main.rs")];
 
 pub(crate) fn check(project: &Project) -> Outcome {
-    let mut files = Vec::new();
-    for folder in ["simd", "core", "std-app", "tests", "fuzz"] {
-        rust_files(&project.root.join(folder), &mut files);
-    }
-    files.sort();
-    let mut texts = Vec::new();
-    for path in &files {
-        let text = fs::read_to_string(path);
-        texts.push(text.map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?);
-    }
-    let test_modules: Vec<PathBuf> =
-        files.iter().zip(&texts).flat_map(|(path, text)| test_modules(path, text)).collect();
-
-    let in_test = |path: &Path| {
-        test_modules.iter().any(|module| path.starts_with(module) || *path == module.with_extension("rs"))
-    };
+    let mut paths = Vec::new();
+    collect(&project.root, &mut paths);
+    paths.sort();
     let name_of = |path: &PathBuf| {
         path.strip_prefix(&project.root).unwrap_or(path).to_string_lossy().replace('\\', "/")
     };
-    let names: Vec<String> = files.iter().map(name_of).collect();
+    let names: BTreeSet<String> = paths.iter().map(name_of).collect();
+    let mut files = Vec::new();
+    for path in paths.into_iter().filter(|path| path.is_file()) {
+        let name = name_of(&path);
+        if TEXTS.iter().any(|end| name.ends_with(end)) {
+            let text = fs::read_to_string(&path);
+            let text = text.map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?;
+            files.push(File { name, path, text });
+        }
+    }
 
-    let mut complaints = Vec::new();
+    let (sources, others): (Vec<&File>, Vec<&File>) =
+        files.iter().partition(|file| file.name.ends_with(".rs") && !file.name.starts_with('.'));
+    let mut complaints = check_sources(&sources);
+    let (pages, scripts): (Vec<&File>, Vec<&File>) =
+        others.into_iter().partition(|file| file.name.ends_with(".md"));
+    let pages: Vec<_> = pages.iter().map(|file| file.text()).collect();
+    let code: Vec<_> = sources.iter().chain(&scripts).map(|file| file.text()).collect();
+    complaints.extend(pages::check(&pages, &code, &names));
+
+    complaints.iter().for_each(|complaint| println!("{complaint}"));
+    match complaints.len() {
+        0 => Ok(format!("{} files, {} pages", sources.len(), pages.len())),
+        count => Err(Failure::Failed(format!("{count} complaints"))),
+    }
+}
+
+/// Complaints about files of Rust.
+fn check_sources(files: &[&File]) -> Vec<String> {
+    let test_modules: Vec<PathBuf> =
+        files.iter().flat_map(|file| test_modules(&file.path, &file.text)).collect();
+    let in_test = |path: &Path| {
+        test_modules.iter().any(|module| path.starts_with(module) || *path == module.with_extension("rs"))
+    };
+    let mut complaints = limits::check_exceptions(files.iter().map(|file| file.name.as_str()));
     let mut core = Vec::new();
-    for ((path, name), text) in files.iter().zip(&names).zip(&texts) {
-        let lines = text.lines().count();
-        let is_core = name.starts_with("core/src/");
-        let most = if is_core && !LONG_FILES.contains(&name.as_str()) { MAX_CORE_LINES } else { MAX_LINES };
-        if lines > most {
-            complaints.push(format!("{name}: {lines} lines, {most} at most"));
-        }
-        if is_core {
-            complaints.extend(long_functions(name, text));
-        }
+    for File { name, path, text } in files {
+        complaints.extend(limits::check(name, text));
+        complaints.extend(names::check(name, text));
         if !text.starts_with("//!") {
             complaints.push(format!("{name}:1: the file does not open with `//!` and what lives in it"));
         }
-        let is_narrow = NARROW.iter().any(|folder| name.starts_with(folder));
-        complaints.extend(
-            wide_lines(text, is_narrow).map(|line| format!("{name}:{line}: more than {COLUMNS} columns")),
-        );
         if !in_test(path) {
             complaints.extend(broken_rules(name, text));
             let below = name.strip_prefix("core/src/");
@@ -130,18 +138,14 @@ pub(crate) fn check(project: &Project) -> Outcome {
         }
     }
     for (root, program) in TEST_PROGRAMS {
-        let text = names.iter().zip(&texts).find(|(name, _)| *name == program).map_or("", |(_, text)| text);
-        let files = names.iter().filter_map(|name| name.strip_prefix(root));
+        let text = files.iter().find(|file| file.name == program).map_or("", |file| &file.text);
+        let names = files.iter().filter_map(|file| file.name.strip_prefix(root));
         complaints.extend(
-            modules_left_out(text, files).map(|name| format!("{root}{name}: {program} does not name it")),
+            modules_left_out(text, names).map(|name| format!("{root}{name}: {program} does not name it")),
         );
     }
     complaints.extend(layers::check(&core));
-    complaints.iter().for_each(|complaint| println!("{complaint}"));
-    match complaints.len() {
-        0 => Ok(format!("{} files", files.len())),
-        count => Err(Failure::Failed(format!("{count} complaints"))),
-    }
+    complaints
 }
 
 /// A complaint for each line of the file that breaks a rule.
@@ -169,43 +173,6 @@ fn modules_left_out<'t>(
         let module = format!("mod {name};");
         name != "main" && !name.contains('/') && !program.lines().any(|line| line == module)
     })
-}
-
-/// A complaint for each function longer than [`MAX_FUNCTION_LINES`]. In code formatted by rustfmt a function
-/// ends at the first closing brace in its own column.
-fn long_functions(name: &str, text: &str) -> Vec<String> {
-    let lines: Vec<&str> = text.lines().collect();
-    let function = |line: &str| {
-        let (before, after) = line.split_once("fn ")?;
-        let is_start = before.split_whitespace().all(|word| {
-            word.starts_with("pub") || word == "const" || word == "unsafe" || word.ends_with(')')
-        });
-        is_start.then(|| after.split(['(', '<']).next().unwrap_or_default().to_owned())
-    };
-    let mut complaints = Vec::new();
-    for (start, line) in lines.iter().enumerate() {
-        let Some(function) = function(line).filter(|function| !function.contains(' ')) else { continue };
-        let indent = &line[..line.len() - line.trim_start().len()];
-        let end = format!("{indent}}}");
-        let is_one_line = line.trim_end().ends_with(['}', ';']);
-        let length = lines[start..].iter().position(|line| is_one_line || *line == end).map_or(0, |i| i + 1);
-        let known = LONG_FUNCTIONS.contains(&format!("{name}: {function}").as_str());
-        if length > MAX_FUNCTION_LINES && !known {
-            let start = start + 1;
-            complaints.push(format!(
-                "{name}:{start}: `{function}` has {length} lines, {MAX_FUNCTION_LINES} at most"
-            ));
-        }
-    }
-    complaints
-}
-
-/// Numbers of the lines longer than [`COLUMNS`]: of all lines with `code`, else of comments.
-fn wide_lines(text: &str, code: bool) -> impl Iterator<Item = usize> {
-    let wide = move |(_, line): &(usize, &str)| {
-        line.chars().count() > COLUMNS && (code || line.trim_start().starts_with("//"))
-    };
-    text.lines().enumerate().filter(wide).map(|(index, _)| index + 1)
 }
 
 /// File modules that are compiled for tests alone: paths without `.rs`.
@@ -245,17 +212,18 @@ fn code(text: &str) -> Vec<(usize, &str)> {
     kept
 }
 
-/// Collects every `.rs` file below `folder`, except build products and tests.
-fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
+/// Collects files and folders below `folder`, except products and corpora.
+fn collect(folder: &Path, paths: &mut Vec<PathBuf>) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        match path.is_dir() {
-            true if ["target", "corpus", "artifacts", "venv", "output"].contains(&&*name) => {}
-            true => rust_files(&path, files),
-            false if name.ends_with(".rs") => files.push(path),
-            false => {}
+        if path.is_dir() {
+            if LEFT_OUT.contains(&&*name) {
+                continue;
+            }
+            collect(&path, paths);
         }
+        paths.push(path);
     }
 }
 
@@ -268,14 +236,6 @@ mod tests {
         let text =
             "let a = 1; // panic!\n#[cfg(test)]\nmod tests {\n    panic!()\n}\n#[cfg(test)]\nuse x;\nlet b;";
         assert_eq!(code(text), [(1, "let a = 1;"), (8, "let b;")]);
-    }
-
-    #[test]
-    fn lines_are_measured_in_characters() {
-        let comment = format!("    // {}", "a".repeat(COLUMNS));
-        let text = format!("{}\n{}\n{comment}\n", "ä".repeat(COLUMNS), "a".repeat(COLUMNS + 1));
-        assert_eq!(wide_lines(&text, true).collect::<Vec<_>>(), [2, 3]);
-        assert_eq!(wide_lines(&text, false).collect::<Vec<_>>(), [3]);
     }
 
     #[test]

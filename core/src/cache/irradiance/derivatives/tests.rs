@@ -3,7 +3,7 @@
 use super::*;
 use crate::Level;
 use crate::cache::irradiance::metric::{Metric, Settings};
-use crate::cache::irradiance::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
+use crate::cache::irradiance::test_rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
 use crate::cache::irradiance::validity;
 use core::hint::black_box;
 use std::println;
@@ -29,7 +29,7 @@ fn errors<const M: usize>(
         for _ in 0..RECEIVERS {
             let at = [0.1 + 0.8 * random.unit(), 0.1 + 0.8 * random.unit()];
             let truth = room.truth(at);
-            let gather = Gather::new(n, &mut random, |w| room.look(at, w));
+            let gather = Gather::new(n, &mut random, |w| room.trace(at, w));
             let parts =
                 |v: [f64; 5]| [v[0] * v[0] + v[1] * v[1], v[2] * v[2] + 2.0 * v[3] * v[3] + v[4] * v[4]];
             for (off, found) in off.iter_mut().zip(estimate(tables, &gather.hemisphere())) {
@@ -99,7 +99,7 @@ fn estimates_beside_the_truth() {
 fn one_radiance_is_flat_but_to_the_open_mesh() {
     let room = Room { square: None, ..SHADOW };
     let (at, n) = ([0.3, 0.2], 16);
-    let gather = Gather::new(n, &mut Random(5), |w| room.look(at, w));
+    let gather = Gather::new(n, &mut Random(5), |w| room.trace(at, w));
     let hemisphere = gather.hemisphere();
     assert_eq!(five(&closed_mesh(Level::detect(), &hemisphere)), [0.0; 5]);
     assert_eq!(five(&ward_heckbert(&hemisphere)), [0.0; 5]);
@@ -125,7 +125,7 @@ fn rotational_gradients_turn_the_receiver() {
     with_tables(n, |tables| {
         for _ in 0..20 {
             let at = [0.2 + 0.6 * random.unit(), 0.2 + 0.6 * random.unit()];
-            let gather = Gather::new(n, &mut random, |w| WALLS.look(at, w));
+            let gather = Gather::new(n, &mut random, |w| WALLS.trace(at, w));
             let hemisphere = gather.hemisphere();
             let level = Level::detect();
             let found = [
@@ -160,7 +160,7 @@ fn rotational_gradients_turn_the_receiver() {
 #[ignore = "prints times"]
 fn print_times() {
     for n in [16, 32, 64] {
-        let gather = Gather::new(n, &mut Random(2), |w| WALLS.look([0.3, 0.4], w));
+        let gather = Gather::new(n, &mut Random(2), |w| WALLS.trace([0.3, 0.4], w));
         let hemisphere = gather.hemisphere();
         let settings = Settings::new(Metric::Halflight, 1.0);
         with_tables(n, |tables| {

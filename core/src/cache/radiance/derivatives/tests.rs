@@ -3,7 +3,7 @@
 use super::*;
 use crate::Level;
 use crate::cache::irradiance::CellFlux;
-use crate::cache::radiance::rooms::{Sky, with_tables};
+use crate::cache::radiance::test_rooms::{Sky, with_tables};
 use crate::cache::radiance::zernike::{DEGREE_MAX, count, gradients, values};
 use crate::memory::{Arena, Line};
 use std::vec;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::cache::radiance::derivatives::border_flux;
-use crate::cache::radiance::rooms::{Sky, with_tables};
+use crate::cache::radiance::test_rooms::{Sky, with_tables};
 use crate::cache::radiance::zernike::{COUNT_MAX, count};
 use crate::memory::Line;
 use std::vec;
