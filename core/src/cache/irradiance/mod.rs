@@ -28,6 +28,4 @@ pub use store::{CachedIrradiance, GREATEST_DEVIATION, IrradianceCache};
 pub use validity::{Validity, validity, validity_with_lobe};
 
 #[cfg(test)]
-mod placement;
-#[cfg(test)]
-mod rooms;
+mod placement_tests;

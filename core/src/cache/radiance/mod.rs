@@ -14,8 +14,6 @@ pub mod lobes;
 mod mirror;
 mod pool;
 mod record_coefficients;
-#[cfg(test)]
-mod rooms;
 mod served;
 pub mod sh;
 mod strata;
@@ -32,6 +30,3 @@ pub use served::{LobeCensus, LobeSettings, ServedLobes};
 pub use strata::StrataTables;
 pub use tables::GatherTables;
 pub(crate) use tables::Projection;
-
-#[cfg(test)]
-pub(in crate::cache) use rooms::Sky;
