@@ -1,13 +1,12 @@
 #!/bin/sh
 # The comparisons of docs/gallery/irradiance.md: sh docs/gallery/irradiance.sh [PART...]
-# Parts: 1700 256 progressive 500 1000 5000 dark sponza. HALFLIGHT names the program, HALFLIGHT_SCENES the folder that has
+# Parts: 1700 256 progressive 500 1000 5000 dark sponza. HALFLIGHT_SCENES names the folder that has
 # sponza-dabrovic, which is not part of this repository. SPONZA="--size 320x240 --records 4000" makes that part smaller.
 set -eu
 cd "$(dirname "$0")/../.."
-program=${HALFLIGHT:-target/release/halflight}
 study() {
-    printf '\n%s\n' "halflight study irradiance $*"
-    "$program" study irradiance "$@"
+    printf '\n%s\n' "cargo lab study irradiance $*"
+    cargo lab study irradiance "$@"
 }
 box() {
     scene=$1

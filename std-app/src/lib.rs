@@ -18,14 +18,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
-pub mod bench;
 pub mod compare;
 mod file_error;
 pub mod load;
 pub mod memory;
-mod pages;
+pub mod pages;
 pub mod picture;
 pub mod render;
 pub mod report;
 pub mod save;
-pub mod stability;

@@ -7,14 +7,14 @@ use memmap2::MmapMut;
 
 /// Zeroed cache lines, mapped from the system.
 #[derive(Debug, Default)]
-pub(crate) struct Pages(Option<MmapMut>);
+pub struct Pages(Option<MmapMut>);
 
 impl Pages {
     /// Lines of `footprint` bytes.
     ///
     /// # Errors
     /// [`OutOfMemory`] if the system refuses.
-    pub(crate) fn new(footprint: Footprint) -> Result<Self, OutOfMemory> {
+    pub fn new(footprint: Footprint) -> Result<Self, OutOfMemory> {
         let needed = footprint.bytes();
         if needed == 0 {
             return Ok(Self(None));

@@ -71,10 +71,8 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("race scene.obj --methods path --time 1s --report scene.mtl", "it is a file, not a folder"),
         ("race missing.obj --methods path --time 1s", "missing.obj"),
         ("info missing.toml", "missing.toml"),
-        ("bench", "rays"),
-        ("bench rays missing.obj", "missing.obj"),
-        ("bench rays scene.obj --size 0x9", "640x480"),
-        ("bench rays scene.obj --simd mmx", "baseline, avx2, avx512"),
+        ("render scene.obj --size 0x9", "640x480"),
+        ("render scene.obj --simd mmx", "baseline, avx2, avx512"),
     ] {
         let said = folder.refused(arguments);
         assert!(said.contains(reason), "{arguments}: {said}");
@@ -300,46 +298,4 @@ fn an_interrupt_saves_what_there_is_and_exits_with_3() {
     let object: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(object["ending"], "interrupted");
     assert_eq!(read(&folder.path("a.png")).unwrap().pixels.len(), 64 * 64);
-}
-
-#[test]
-fn bench_rays_measures_the_cornell_box() {
-    let folder = Folder::new("bench");
-    let cornell = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
-    let object = folder.object(&format!(
-        "bench rays {cornell} --eye 278,273,-800 --look-at 278,273,0 --fov 39.3 --simd baseline --json"
-    ));
-    assert_eq!(object["level"], "baseline");
-    assert!(object["build_seconds"].as_f64().unwrap() > 0.0);
-    assert!(object["bytes_per_triangle"].as_f64().unwrap() > 36.0, "three corners at least");
-    for class in ["primary", "diffuse", "shadow"] {
-        assert!(object["mrays_per_second"][class].as_f64().unwrap() > 0.0, "{class}");
-    }
-    assert_eq!(object["rays"]["primary"], 1024 * 1024);
-    assert_eq!(object["hits"]["primary"], object["rays"]["diffuse"], "one bounce from each hit");
-    assert_eq!(files(&folder.0), 2, "nothing is written");
-
-    // Neither side is a multiple of a tile.
-    let object = folder.object(&format!("bench rays {cornell} --size 37x21 --simd baseline --json"));
-    assert_eq!((&object["width"], &object["height"]), (&37.into(), &21.into()));
-    assert_eq!(object["rays"]["primary"], 37 * 21);
-    assert_eq!(object["hits"]["primary"], object["rays"]["diffuse"]);
-    assert_eq!(object["rays"]["shadow"], object["rays"]["diffuse"]);
-
-    let away = "bench rays scene.obj --eye 0,0,9 --look-at 0,0,10 --json";
-    let object = folder.object(away);
-    assert_eq!(object["hits"]["primary"], 0);
-    assert!(object["mrays_per_second"]["diffuse"].is_null(), "no rays, no speed");
-}
-
-#[test]
-fn stability_prints_its_table() {
-    let folder = Folder::new("stability");
-    let object = folder.object("stability --only grazing --json");
-    assert_eq!((object["passed"].as_u64(), object["failed"].as_u64()), (Some(7), Some(0)));
-    for key in ["group", "case", "expected", "measured", "passed"] {
-        assert!(!object["cases"][0][key].is_null(), "{key}");
-    }
-    let text = folder.run("stability --only grazing");
-    assert!(String::from_utf8(text.stdout).unwrap().contains("7 cases, 0 not as expected"));
 }

@@ -2,7 +2,6 @@
 //! functions.
 
 mod audit;
-mod bench;
 mod caustics;
 mod cli;
 mod compare;

@@ -5,4 +5,5 @@ pub mod references;
 pub mod render;
 pub mod rooms;
 pub mod scenes;
+pub mod snapshot;
 pub mod statistics;

@@ -2,15 +2,16 @@
 //! their standard errors.
 //!
 //! ```text
-//! REFERENCES=write cargo test --profile quick -p halflight-tests --test main
+//! SNAPSHOT=write cargo test --profile quick -p halflight-tests --test main
 //! ```
 //!
 //! renders those of the tests that it runs anew. A scene that changes needs it.
 
+use crate::snapshot;
 use crate::statistics::Estimates;
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 
 /// The reference of that name; `pictures` renders values of independent pictures if it is to be written.
@@ -18,16 +19,16 @@ use std::sync::Mutex;
 /// # Panics
 /// If the file has no such reference, or cannot be read or written.
 pub fn reference(name: &str, pictures: impl FnOnce() -> Vec<Vec<f64>>) -> Estimates {
-    if std::env::var_os("REFERENCES").is_some_and(|value| value == "write") {
+    if snapshot::is_written() {
         write(name, &Estimates::of(&pictures()));
     }
     let rows = read();
-    let row = rows.get(name).unwrap_or_else(|| panic!("no reference {name}: REFERENCES=write makes one"));
+    let row = rows.get(name).unwrap_or_else(|| panic!("no reference {name}: SNAPSHOT=write makes one"));
     parse(row).unwrap_or_else(|| panic!("the reference {name} is damaged"))
 }
 
 fn file() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references.txt")
+    snapshot::path("references.txt")
 }
 
 /// Rows of the file by name.

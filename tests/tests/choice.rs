@@ -1,7 +1,7 @@
 //! Choice of a method where none is given. The snapshot `tests/tests/choices.txt` shows every change of a
 //! choice in its diff:
 //!
-//!     CHOICES=write cargo test --profile quick -p halflight-tests --test main choice::
+//!     SNAPSHOT=write cargo test --profile quick -p halflight-tests --test main choice::
 
 use crate::table::scenes::SCENES;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -13,8 +13,7 @@ use halflight_core::scene::{Camera, Material};
 use halflight_simd::Level;
 use halflight_tests::render::{number, render};
 use halflight_tests::scenes::{SceneBuffers, box_from_above, emitter, metal};
-use std::fs;
-use std::path::Path;
+use halflight_tests::snapshot;
 
 const SIZE: u32 = 96;
 const SPP: u32 = 16;
@@ -194,12 +193,5 @@ fn choices() -> String {
 
 #[test]
 fn choices_are_those_of_the_snapshot() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/choices.txt");
-    let (now, before) = (choices(), fs::read_to_string(&file).unwrap_or_default());
-    if std::env::var_os("CHOICES").is_some_and(|value| value == "write") {
-        fs::write(&file, now).expect("the snapshot can be written");
-        return;
-    }
-    let changed = now.lines().zip(before.lines()).find(|(now, before)| now != before);
-    assert!(now == before, "choices differ, the first: {changed:?}");
+    snapshot::check("choices.txt", &choices());
 }

@@ -4,7 +4,7 @@
 //! The renderer is deterministic, so a change of structure keeps every row. Rows change in commits that fix
 //! an error or delete a mechanism, and these commits say so:
 //!
-//!     GOLDEN=write cargo test --profile quick -p halflight-tests --test main golden::
+//!     SNAPSHOT=write cargo test --profile quick -p halflight-tests --test main golden::
 //!
 //! rewrites `golden.txt`.
 
@@ -17,10 +17,11 @@ use halflight_tests::render::render;
 use halflight_tests::scenes::{
     SceneBuffers, constant_environment, cornell_box, everything, glass, in_a_room, lamp_before,
 };
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use halflight_tests::snapshot;
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Mutex;
-use std::{fs, thread};
+use std::thread;
 
 /// Pixels across and down: tiles of 16 pixels are cut at the border.
 const SIZE: u32 = 20;
@@ -103,34 +104,13 @@ fn rows(
     rows.into_inner().expect("no panic holds it")
 }
 
-fn table() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden.txt")
-}
-
-/// Rows of the file by name of the render.
-fn read_rows() -> BTreeMap<String, String> {
-    let text = fs::read_to_string(table()).unwrap_or_default();
-    let lines = text.lines().filter(|line| !line.starts_with('#'));
-    lines.filter_map(|line| line.split_once(" = ")).map(|(key, row)| (key.into(), row.into())).collect()
-}
-
 #[test]
 fn pictures_are_the_same_to_the_bit() {
-    let (before, mut now) = (read_rows(), BTreeMap::new());
+    let mut all_rows = BTreeMap::new();
     let all: Vec<Level> = Level::detect().and_below().collect();
     let mut levels = all.into_iter().cycle();
-    for_each_scene(|name, scene| now.append(&mut rows(name, scene, &mut levels)));
-    if std::env::var_os("GOLDEN").is_some_and(|value| value == "write") {
-        let mut text = "# scene method seed = hash of the picture, mean, estimated relMSE\n".to_owned();
-        now.iter().for_each(|(key, row)| text += &format!("{key} = {row}\n"));
-        fs::write(table(), text).expect("the table can be written");
-        return;
-    }
-    let keys: BTreeSet<&String> = before.keys().chain(now.keys()).collect();
-    let differs = |key: &&String| before.get(*key) != now.get(*key);
-    let shown = |rows: &BTreeMap<String, String>, key| rows.get(key).cloned().unwrap_or("no row".into());
-    let changed: Vec<String> = (keys.into_iter().filter(differs))
-        .map(|key| format!("{key}: {} -> {}", shown(&before, key), shown(&now, key)))
-        .collect();
-    assert!(changed.is_empty(), "{} rows differ:\n{}", changed.len(), changed.join("\n"));
+    for_each_scene(|name, scene| all_rows.append(&mut rows(name, scene, &mut levels)));
+    let mut text = "# scene method seed = hash of the picture, mean, estimated relMSE\n".to_owned();
+    all_rows.iter().for_each(|(key, row)| text += &format!("{key} = {row}\n"));
+    snapshot::check("golden.txt", &text);
 }

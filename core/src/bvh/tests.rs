@@ -6,24 +6,8 @@ use crate::geometry::Frame;
 use crate::memory::Line;
 use crate::scene::Triangle;
 use glam::Vec3;
+use halflight_test_support::Random;
 use std::vec::Vec;
-
-/// Random numbers for scenes and rays.
-struct Random(u32);
-
-impl Random {
-    fn bits(&mut self) -> u32 {
-        self.0 = self.0.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        let word = (self.0 >> (self.0 >> 28).wrapping_add(4) ^ self.0).wrapping_mul(277_803_737);
-        word >> 22 ^ word
-    }
-    fn unit(&mut self) -> f32 {
-        (self.bits() >> 8) as f32 / (1 << 24) as f32
-    }
-    fn point(&mut self, size: f32) -> Vec3 {
-        Vec3::new(self.unit() - 0.5, self.unit() - 0.5, self.unit() - 0.5) * size
-    }
-}
 
 struct Soup {
     positions: Vec<[f32; 3]>,
@@ -50,10 +34,10 @@ fn lines(bytes: usize) -> Vec<Line> {
 }
 
 fn random_soup(count: usize, size: f32, offset: Vec3) -> Soup {
-    let mut random = Random(count as u32);
+    let mut random = Random(count as u64);
     Soup::of((0..count).map(|_| {
-        let middle = random.point(10.0);
-        [(); 3].map(|()| offset + middle + random.point(size))
+        let middle = (random.point() - 0.5) * 10.0;
+        [(); 3].map(|()| offset + middle + (random.point() - 0.5) * size)
     }))
 }
 
@@ -103,8 +87,8 @@ fn random_rays(count: usize, offset: Vec3) -> Vec<Ray> {
     let mut random = Random(99);
     (0..count)
         .map(|i| {
-            let (origin, direction) = (offset + random.point(12.0), random.point(2.0));
-            let t_max = if i % 3 == 0 { 3.0 * random.unit() } else { f32::INFINITY };
+            let (origin, direction) = (offset + (random.point() - 0.5) * 12.0, (random.point() - 0.5) * 2.0);
+            let t_max = if i % 3 == 0 { 3.0 * random.unit_f32() } else { f32::INFINITY };
             Ray::segment(origin, direction, t_max)
         })
         .collect()
@@ -132,7 +116,7 @@ fn tiles_of_a_pinhole_and_of_a_lens() {
             .map(|i| {
                 // Most tiles lie on one side of the axes, some across them.
                 let (x, y) = ((i / 64 % 5 * 8 + i % 8) as f32, (i / 320 * 8 + i % 64 / 8) as f32);
-                let origin = Vec3::new(0.0, 0.0, 9.0) + random.point(lens);
+                let origin = Vec3::new(0.0, 0.0, 9.0) + (random.point() - 0.5) * lens;
                 Ray::new(origin, Vec3::new(x / 20.0 - 0.7, y / 10.0 - 0.6, -1.0))
             })
             .collect();
@@ -157,9 +141,9 @@ fn duplicates_slivers_and_points() {
     let mut random = Random(5);
     let mut corners = Vec::new();
     for i in 0..300 {
-        let (a, b) = (random.point(4.0), random.point(4.0));
+        let (a, b) = ((random.point() - 0.5) * 4.0, (random.point() - 0.5) * 4.0);
         corners.push(match i % 4 {
-            0 => [a, b, a.lerp(b, 0.5) + random.point(1e-5)],
+            0 => [a, b, a.lerp(b, 0.5) + (random.point() - 0.5) * 1e-5],
             1 => [a, a, b],
             2 => [a, a, a],
             _ => [Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 3.0],
@@ -293,11 +277,11 @@ fn what_a_survey_is_sure_of_rays_find() {
         let mesh = soup.mesh();
         let mut memory = lines(Bvh::footprint(mesh.triangles.len()).bytes());
         let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory)).unwrap();
-        for _ in 0..3000 {
-            let [a, b, c] = mesh.corners(random.bits() % mesh.triangles.len() as u32);
-            let (u, v) = (0.5 * random.unit(), 0.5 * random.unit());
+        for _ in 0..4000 {
+            let [a, b, c] = mesh.corners(random.below(mesh.triangles.len()) as u32);
+            let (u, v) = (0.5 * random.unit_f32(), 0.5 * random.unit_f32());
             let frame = Frame::from_normal((b - a).cross(c - a).normalize());
-            let (radius, above) = (0.01 + random.unit(), 1e-4);
+            let (radius, above) = (0.01 + random.unit_f32(), 1e-4);
             let place = a + u * (b - a) + v * (c - a) + above * frame.normal;
             let points = POINTS_ASIDE.map(|axis| axis.map(|at| at * radius));
             let query = ClearanceQuery { place, frame, reach: radius, points, depth: 0.3 * radius };
@@ -305,13 +289,13 @@ fn what_a_survey_is_sure_of_rays_find() {
             let level = Level::detect();
             low += u32::from(!clearance.has_wall);
             for _ in 0..if clearance.has_wall { 0 } else { 16 } {
-                let local = random.point(2.0).with_z(random.unit());
+                let local = (2.0 * random.point() - 1.0).with_z(random.unit_f32());
                 let way = radius / 3f32.sqrt() * frame.to_world(local.normalize());
                 assert!(!bvh.occluded(level, &Ray::segment(place, way, 1.0)), "{query:?} {way}");
             }
             unhung += u32::from(clearance.has_wall && !clearance.has_overhang);
             for _ in 0..if clearance.has_overhang { 0 } else { 16 } {
-                let local = random.point(2.0).with_z(1.0).normalize();
+                let local = (2.0 * random.point() - 1.0).with_z(1.0).normalize();
                 let way = radius / 3f32.sqrt() * frame.to_world(local);
                 let hit = bvh.nearest(level, &Ray::segment(place, way, 1.0));
                 if hit.is_some() {

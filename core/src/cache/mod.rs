@@ -5,4 +5,6 @@ mod hessian;
 pub mod irradiance;
 mod octree;
 pub mod radiance;
+#[cfg(test)]
+mod skies;
 pub mod view;

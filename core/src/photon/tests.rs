@@ -3,26 +3,9 @@
 use super::*;
 use crate::Rgb;
 use crate::memory::Line;
+use halflight_test_support::Random;
 use std::vec;
 use std::vec::Vec;
-
-/// Random numbers without dependencies.
-pub(super) struct Random(pub u64);
-
-impl Random {
-    pub(super) fn bits(&mut self) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as u32 ^ (self.0 >> 48) as u32
-    }
-
-    pub(super) fn unit(&mut self) -> f32 {
-        (self.bits() >> 7) as f32 / (1 << 24) as f32
-    }
-
-    pub(super) fn point(&mut self) -> Vec3 {
-        Vec3::new(self.unit(), self.unit(), self.unit())
-    }
-}
 
 pub(crate) fn lines(footprint: Footprint) -> Vec<Line> {
     vec![Line([0; 64]); footprint.bytes() / size_of::<Line>()]
@@ -85,11 +68,11 @@ fn sets(n: usize) -> Vec<(&'static str, Vec<Vec3>)> {
     let mut set = |make: &mut dyn FnMut(usize, &mut Random) -> Vec3| -> Vec<Vec3> {
         (0..n).map(|i| make(i, &mut random)).collect()
     };
-    let wide = |random: &mut Random| libm::exp10f(-20.0 + 40.0 * random.unit());
+    let wide = |random: &mut Random| libm::exp10f(-20.0 + 40.0 * random.unit_f32());
     vec![
         ("volume", set(&mut |_, random| random.point())),
         ("wall", set(&mut |_, random| random.point().with_y(0.5))),
-        ("line", set(&mut |_, random| Vec3::new(0.25, random.unit(), -1.0))),
+        ("line", set(&mut |_, random| Vec3::new(0.25, random.unit_f32(), -1.0))),
         ("one place", set(&mut |_, _| Vec3::new(0.1, 0.2, 0.3))),
         ("grid", set(&mut |_, random| (random.point() * 4.0).floor() * 0.25)),
         ("focus", set(&mut |i, random| random.point() * if i % 3 == 0 { 1.0 } else { 1e-3 })),
@@ -110,10 +93,10 @@ fn searches_find_what_brute_force_finds() {
                 let mut random = Random(99);
                 let extent = places.iter().fold(0.0, |most: f32, place| most.max(place.abs().max_element()));
                 for i in 0..6 {
-                    let near = places.get(random.bits() as usize % n.max(1)).copied().unwrap_or(Vec3::ONE);
+                    let near = places.get(random.below(n)).copied().unwrap_or(Vec3::ONE);
                     let place =
                         [near, near + random.point() * (0.1 * extent), random.point() * extent][i % 3];
-                    for radius in [f32::INFINITY, 0.0, 0.1 * extent, random.unit() * extent] {
+                    for radius in [f32::INFINITY, 0.0, 0.1 * extent, random.unit_f32() * extent] {
                         check_searches(map, place, radius);
                     }
                 }
@@ -237,7 +220,7 @@ fn what_is_gathered_is_what_brute_force_gathers() {
             let disc = QueryDisc {
                 place: places[i * 100] + random.point() * 0.01,
                 normal: (Vec3::Z + 0.5 * random.point()).normalize(),
-                radius: 0.3 * random.unit(),
+                radius: 0.3 * random.unit_f32(),
                 kernel: [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov][i % 3],
             };
             let expected = brute::gather(map, &disc, &Uniform(Rgb::new(0.5, 1.0, 2.0)));
@@ -322,7 +305,7 @@ fn nothing_leaks_through_a_thin_wall_or_around_an_edge() {
     let mut memory = lines(Photons::footprint(40_000));
     let mut photons = Photons::new(40_000, &mut Arena::over(&mut memory)).unwrap();
     for (i, photon) in photons.as_mut_slice().iter_mut().enumerate() {
-        let (a, b) = (random.unit() - 0.5, random.unit());
+        let (a, b) = (random.unit_f32() - 0.5, random.unit_f32());
         *photon = match i % 2 {
             0 => Photon::new(Vec3::new(0.0, a, b), Vec3::new(1.0, 0.2, 0.3), Vec3::X, Rgb::ONE),
             _ => Photon::new(Vec3::new(b, a, 0.0), Vec3::new(0.4, 0.2, 1.0), Vec3::Z, Rgb::ONE),

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 use halflight_fuzz::{TARGETS, Target};
+use halflight_test_support::Random;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -27,7 +28,7 @@ fn main() -> ExitCode {
     };
     let home = Path::new(env!("CARGO_MANIFEST_DIR"));
     let corpus = files(&home.join("corpus").join(name));
-    let mut random = Random(number("--seed", 1));
+    let mut random = Random(number("--seed", 1).max(1));
     let end = Instant::now() + Duration::from_secs(number("--seconds", 20));
     // A negative number means no limit.
     let most_runs = number("--runs", u64::MAX);
@@ -58,7 +59,7 @@ fn mutated(corpus: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
         let end = (at + 1 + random.below(16)).min(input.len()).max(at);
         match random.below(5) {
             0 if at < input.len() => input[at] ^= 1 << random.below(8),
-            1 if at < input.len() => input[at] = random.next() as u8,
+            1 if at < input.len() => input[at] = random.bits() as u8,
             2 => drop(input.drain(at..end)),
             3 => drop(input.splice(at..at, input[at..end].to_vec())),
             _ => {
@@ -66,7 +67,7 @@ fn mutated(corpus: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
                 let from = random.below(other.len() + 1);
                 let to = (from + random.below(64)).min(other.len());
                 input.splice(at..end, other[from..to].iter().copied());
-                input.extend((0..random.below(32)).map(|_| random.next() as u8));
+                input.extend((0..random.below(32)).map(|_| random.bits() as u8));
             }
         }
     }
@@ -79,21 +80,4 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     paths.sort();
     paths.iter().filter_map(|path| fs::read(path).ok()).collect()
-}
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let a = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let b = (a ^ (a >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        b ^ (b >> 31)
-    }
-
-    /// Uniform in 0 … bound − 1; 0 if the bound is 0.
-    fn below(&mut self, bound: usize) -> usize {
-        (self.next() % bound.max(1) as u64) as usize
-    }
 }

@@ -2,7 +2,6 @@
 //! docs/cli.md its interface for scripts.
 #![forbid(unsafe_code)]
 
-mod bench;
 mod camera_args;
 mod compare;
 mod failure;
@@ -15,10 +14,7 @@ mod progress;
 mod race;
 mod race_entry;
 mod render;
-mod stability;
 mod stdio;
-mod study;
-mod study_radiance;
 mod summary;
 mod values;
 
@@ -47,9 +43,6 @@ enum Command {
     Merge(merge::Merge),
     Race(Box<race::Race>),
     Info(info::Info),
-    Bench(bench::Bench),
-    Stability(stability::Stability),
-    Study(study::Study),
 }
 
 /// Runs the program. Exit codes are a contract (docs/cli.md).
@@ -66,9 +59,6 @@ fn main() -> ExitCode {
         Command::Merge(command) => command.run(),
         Command::Race(command) => command.run(),
         Command::Info(command) => command.run(),
-        Command::Bench(command) => command.run(),
-        Command::Stability(command) => command.run(),
-        Command::Study(command) => command.run(),
     }));
     match outcome {
         Ok(Ok(code)) => return code,

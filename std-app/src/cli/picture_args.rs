@@ -1,4 +1,4 @@
-//! Flags of a picture and of its method that `render`, `race` and `study` share, and the settings that follow
+//! Flags of a picture and of its method that `render` and `race` share, and the settings that follow
 //! from them.
 
 use super::camera_args::CameraArgs;

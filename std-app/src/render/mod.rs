@@ -21,13 +21,11 @@ mod memory;
 mod merge;
 mod method;
 mod picture;
-mod radiance_study;
 mod rejected_tiles;
 mod rewritten_file;
 mod rounds;
 mod run;
 mod sealed;
-mod study;
 mod survey;
 mod threads;
 
@@ -46,15 +44,9 @@ pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{Basis, CacheSettings, LobeSettings, MapView, Method, PhotonSettings, PhotonView};
-pub use radiance_study::{
-    ALPHAS, BasisError, GradientError, LobeDegrees, RadianceMetricError, RadianceTimes, STUDY_ANGLES,
-    STUDY_RECORDS, picture_of_radiance_metrics, study_bases, study_gradients, study_lobe_degrees,
-    study_radiance_metrics, study_radiance_times,
-};
 pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
 pub use run::render;
-pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Mark, Survey, SurveyPixel};
 
 use crate::save::Image;

@@ -262,11 +262,7 @@ fn survey_pixel(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -
 }
 
 /// Weighted means over the records used at a point; NaN without records.
-pub(super) fn means(
-    place: &GatherPoint,
-    caches: [&IrradianceCache; 2],
-    of: impl Fn(&Record) -> [f32; 2],
-) -> [f32; 2] {
+fn means(place: &GatherPoint, caches: [&IrradianceCache; 2], of: impl Fn(&Record) -> [f32; 2]) -> [f32; 2] {
     let (mut sums, mut weights) = ([0.0; 2], 0.0);
     for cache in caches {
         cache.visit(&place.query(), |record, weight| {

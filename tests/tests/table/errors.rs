@@ -1,15 +1,14 @@
 //! Snapshot of relMSE of each method in each scene for several sample budgets, against plain path tracing.
 //! Pictures are deterministic, so the numbers are too.
 //!
-//!     ERRORS=write cargo test --profile quick -p halflight-tests --test main table::errors::
+//!     SNAPSHOT=write cargo test --profile quick -p halflight-tests --test main table::errors::
 //!
 //! rewrites `tests/tests/errors.txt`; a commit that changes a number shows it in its diff.
 
 use super::METHODS;
 use super::pictures::{is_small, picture, reference};
 use super::scenes::SCENES;
-use std::fs;
-use std::path::Path;
+use halflight_tests::snapshot;
 
 /// Budgets in samples per pixel.
 const BUDGETS: [u32; 3] = [1, 8, 32];
@@ -41,13 +40,5 @@ fn errors_are_those_of_the_snapshot() {
         println!("skipped: small pictures have other errors");
         return;
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/errors.txt");
-    let (now, before) = (table(), fs::read_to_string(&file).unwrap_or_default());
-    if std::env::var_os("ERRORS").is_some_and(|value| value == "write") {
-        fs::write(&file, now).expect("the snapshot can be written");
-        return;
-    }
-    let mut changed = now.lines().zip(before.lines()).filter(|(now, before)| now != before);
-    let first = changed.next();
-    assert!(now == before, "errors differ, {} rows or more; the first: {first:?}", changed.count() + 1);
+    snapshot::check("errors.txt", &table());
 }

@@ -42,7 +42,8 @@ mod tests {
     use super::*;
     use crate::Level;
     use crate::cache::irradiance::CellFlux;
-    use crate::cache::radiance::{Basis, GatherTables, Representation, Sky};
+    use crate::cache::radiance::{Basis, GatherTables, Representation};
+    use crate::cache::skies::Sky;
     use crate::memory::{Arena, Line};
     use core::f32::consts::PI;
     use std::vec;

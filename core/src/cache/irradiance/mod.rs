@@ -29,5 +29,3 @@ pub use validity::{Validity, validity, validity_with_lobe};
 
 #[cfg(test)]
 mod placement_tests;
-#[cfg(test)]
-mod test_rooms;

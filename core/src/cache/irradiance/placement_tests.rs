@@ -1,13 +1,14 @@
 //! Comparison of metrics with equal numbers of records, on the floor of rooms with known irradiance: records
 //! are gathered in random order wherever none is valid, and interpolation is compared with the truth.
 
-use super::test_rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
 use super::{Derivatives, IrradianceCache, Metric, QueryPoint, Record, metric, validity};
 use crate::Level;
+use crate::cache::skies::{LIGHT, OPEN, SHADOW, Sky, WALLS, with_cells};
 use crate::geometry::{Bounds, Frame};
 use crate::light::luminance;
 use crate::memory::{Arena, Line};
-use glam::Vec3;
+use glam::{DVec2, Vec3};
+use halflight_test_support::{Random, Room};
 use std::vec::Vec;
 use std::{println, vec};
 
@@ -31,11 +32,11 @@ impl Floor {
     fn new(room: &Room, metrics: &[Metric]) -> Self {
         let mut random = Random(31);
         let at = |k: usize| 0.05 + 0.9 * (k as f64 + 0.5) / SIDE as f64;
-        let places: Vec<[f64; 2]> = (0..SIDE * SIDE).map(|i| [at(i % SIDE), at(i / SIDE)]).collect();
+        let places: Vec<DVec2> = (0..SIDE * SIDE).map(|i| DVec2::new(at(i % SIDE), at(i / SIDE))).collect();
         let (mut derivatives, mut noise) = (vec![vec![]; metrics.len()], vec![]);
-        with_tables(STRATA, |tables| {
+        with_cells(STRATA, |tables| {
             for &place in &places {
-                let gather = Gather::new(STRATA, &mut random, |w| room.trace(place, w));
+                let gather = Sky::of_room(STRATA, &mut random, room, place);
                 let irradiance = luminance(gather.hemisphere().irradiance());
                 noise.push(gather.hemisphere().variance() / (irradiance * irradiance));
                 for (metric, derivatives) in metrics.iter().zip(&mut derivatives) {
@@ -46,11 +47,11 @@ impl Floor {
         });
         let mut order: Vec<usize> = (0..places.len()).collect();
         for i in (1..order.len()).rev() {
-            order.swap(i, (random.unit() * (i + 1) as f64) as usize);
+            order.swap(i, random.below(i + 1));
         }
         Self {
             truth: places.iter().map(|&place| room.irradiance(place)).collect(),
-            points: places.iter().map(|&[x, y]| Vec3::new(x as f32, y as f32, 0.0)).collect(),
+            points: places.iter().map(|place| place.as_vec2().extend(0.0)).collect(),
             derivatives,
             noise,
             order,

@@ -66,8 +66,8 @@ impl Coefficients {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cache::radiance::test_rooms::{Sky, with_tables};
     use crate::cache::radiance::zernike::{DEGREE_MAX, index};
+    use crate::cache::skies::{Sky, with_strata};
 
     /// L = 1 + s·w: E = π + 2π/3 s_z, degree 1 = s √π/2, and with P_j of Legendre ∫ z Z_{2j,0} dx dy =
     /// √(π(2j + 1)) ∫ √((1 - t)/2) P_j dt/√2 = -2 √(π(2j + 1))/((2j - 1)(2j + 1)(2j + 3)).
@@ -79,7 +79,7 @@ mod tests {
         const N: usize = 128;
         let s = [0.5f32, -0.25, 0.75];
         let sky = Sky::new(N, |w| 1.0 + s[0] * w[0] + s[1] * w[1] + s[2] * w[2]);
-        with_tables(N, DEGREE_MAX, |tables| {
+        with_strata(N, DEGREE_MAX, |tables| {
             let found = Coefficients::project(Level::detect(), tables, &sky.hemisphere()).unwrap();
             let root = libm::sqrtf(PI);
             let mut wanted = [0.0; COUNT_MAX];
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn degree_zero_is_the_irradiance_to_the_bit() {
         let sky = Sky::new(17, |w| 0.3 + w[0] * w[0] * w[2]);
-        with_tables(17, 4, |tables| {
+        with_strata(17, 4, |tables| {
             let hemisphere = sky.hemisphere();
             for level in Level::detect().and_below() {
                 let found = Coefficients::project(level, tables, &hemisphere).unwrap();
@@ -118,7 +118,7 @@ mod tests {
     fn coefficients_turn_and_mirror_with_the_light() {
         let light = |w: [f32; 3]| 1.0 + w[0] * w[1] * w[1] + 0.4 * w[0] * w[2] - 0.2 * w[1];
         let (sin, cos) = (0.6f32, 0.8f32);
-        with_tables(64, 6, |tables| {
+        with_strata(64, 6, |tables| {
             let of = |sky: Sky| Coefficients::project(Level::detect(), tables, &sky.hemisphere()).unwrap();
             let here = of(Sky::new(64, light)).values[1];
             let turned = Sky::new(64, |[x, y, z]| light([cos * x + sin * y, cos * y - sin * x, z]));

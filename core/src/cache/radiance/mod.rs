@@ -18,8 +18,6 @@ mod served;
 pub mod sh;
 mod strata;
 mod tables;
-#[cfg(test)]
-mod test_rooms;
 pub mod zernike;
 
 pub use basis::{Basis, Representation};
@@ -32,6 +30,3 @@ pub use served::{LobeCensus, LobeSettings, ServedLobes};
 pub use strata::StrataTables;
 pub use tables::GatherTables;
 pub(crate) use tables::Projection;
-
-#[cfg(test)]
-pub(in crate::cache) use test_rooms::Sky;

@@ -148,7 +148,7 @@ fn mean(degree: usize, points: impl ExactSizeIterator<Item = [f32; 2]>, row: &mu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cache::radiance::test_rooms::with_tables;
+    use crate::cache::skies::with_strata;
     use crate::memory::Line;
     use core::f64::consts::PI;
     use std::vec;
@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn means_are_orthonormal_to_the_resolution_of_the_strata() {
         for (n, least) in [(16, 0.66), (32, 0.89), (64, 0.965)] {
-            with_tables(n, 6, |tables| {
+            with_strata(n, 6, |tables| {
                 let mut norms = [0.0f64; 32];
                 for row in tables.means().as_flattened().chunks_exact(32) {
                     for (norm, value) in norms.iter_mut().zip(row) {
@@ -194,7 +194,7 @@ mod tests {
         const N: usize = 32;
         /// Eight chords for a border, relative to the moment.
         const CHORDS: f32 = 3e-3;
-        with_tables(N, 2, |tables| {
+        with_strata(N, 2, |tables| {
             let mut sums = [[0.0f32; 2]; N * N];
             for i in 0..N {
                 let (_, normals) = tables.borders_of_row(i);

@@ -5,6 +5,7 @@
 use super::*;
 use crate::{Kernel, Lanes, Level, Simd};
 use core::f64::consts::PI;
+use halflight_test_support::Random;
 use std::vec::Vec;
 
 /// Root mean square error of a row's triangles, relative to that of the expected values.
@@ -106,40 +107,24 @@ fn less(a: Flux<f64>, b: &Flux<f64>) -> Flux<f64> {
     }
 }
 
-/// xorshift64*.
-struct Random(u64);
+/// Random direction whose cosine with the normal is from `low` to `high`.
+fn direction(random: &mut Random, low: f64, high: f64) -> Wide {
+    let (z, phi) = (random.between(low, high), random.between(0.0, 2.0 * PI));
+    let r = (1.0 - z * z).sqrt();
+    [r * phi.cos(), r * phi.sin(), z]
+}
 
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// Random direction whose cosine with the normal is from `low` to `high`.
-    fn direction(&mut self, low: f64, high: f64) -> Wide {
-        let (z, phi) = (self.between(low, high), self.between(0.0, 2.0 * PI));
-        let r = (1.0 - z * z).sqrt();
-        [r * phi.cos(), r * phi.sin(), z]
-    }
-
-    /// Counter-clockwise triangle about `angle` wide around a direction, at these distances.
-    fn triangle(&mut self, centre: Wide, angle: f64, distances: [f64; 3]) -> [Corner; 3] {
-        let x = unit(cross(centre, [0.3, 0.5, 0.8]));
-        let y = cross(centre, x);
-        let turn = self.between(0.0, 2.0 * PI);
-        core::array::from_fn(|k| {
-            let phi = turn + 2.0 * PI / 3.0 * (k as f64 + self.between(-0.2, 0.2));
-            let (s, c) = (0.58 * angle).sin_cos();
-            let w: Wide = core::array::from_fn(|i| c * centre[i] + s * (phi.cos() * x[i] + phi.sin() * y[i]));
-            corner(unit(w), distances[k])
-        })
-    }
+/// Counter-clockwise triangle about `angle` wide around a direction, at these distances.
+fn triangle(random: &mut Random, centre: Wide, angle: f64, distances: [f64; 3]) -> [Corner; 3] {
+    let x = unit(cross(centre, [0.3, 0.5, 0.8]));
+    let y = cross(centre, x);
+    let turn = random.between(0.0, 2.0 * PI);
+    core::array::from_fn(|k| {
+        let phi = turn + 2.0 * PI / 3.0 * (k as f64 + random.between(-0.2, 0.2));
+        let (s, c) = (0.58 * angle).sin_cos();
+        let w: Wide = core::array::from_fn(|i| c * centre[i] + s * (phi.cos() * x[i] + phi.sin() * y[i]));
+        corner(unit(w), distances[k])
+    })
 }
 
 fn corner(direction: Wide, distance: f64) -> Corner {
@@ -151,37 +136,37 @@ type Row = (&'static str, f64, fn(&mut Random) -> [Corner; 3]);
 
 const ROWS: [Row; 11] = [
     ("large", 1.0, |r| {
-        let (centre, t) = (r.direction(0.6, 1.0), [r.between(1.0, 3.0), r.between(1.0, 3.0), 1.0]);
-        r.triangle(centre, 1.0, t)
+        let (centre, t) = (direction(r, 0.6, 1.0), [r.between(1.0, 3.0), r.between(1.0, 3.0), 1.0]);
+        triangle(r, centre, 1.0, t)
     }),
     ("a stratum of 32 x 32", 0.025, |r| {
-        let (centre, t) = (r.direction(0.3, 1.0), [r.between(1.0, 1.1), r.between(1.0, 1.1), 1.0]);
-        r.triangle(centre, 0.025, t)
+        let (centre, t) = (direction(r, 0.3, 1.0), [r.between(1.0, 1.1), r.between(1.0, 1.1), 1.0]);
+        triangle(r, centre, 0.025, t)
     }),
     ("1e-3 rad", 1e-3, |r| {
-        let centre = r.direction(0.3, 1.0);
-        r.triangle(centre, 1e-3, [2.0; 3])
+        let centre = direction(r, 0.3, 1.0);
+        triangle(r, centre, 1e-3, [2.0; 3])
     }),
     ("an occluder's jump, 1 : 10", 0.05, |r| {
-        let centre = r.direction(0.3, 1.0);
-        r.triangle(centre, 0.05, [1.0, 10.0, 9.0])
+        let centre = direction(r, 0.3, 1.0);
+        triangle(r, centre, 0.05, [1.0, 10.0, 9.0])
     }),
     ("an occluder's jump, 1 : 1000", 0.05, |r| {
-        let centre = r.direction(0.3, 1.0);
-        r.triangle(centre, 0.05, [0.01, 10.0, 9.0])
+        let centre = direction(r, 0.3, 1.0);
+        triangle(r, centre, 0.05, [0.01, 10.0, 9.0])
     }),
     ("far away", 0.05, |r| {
-        let centre = r.direction(0.3, 1.0);
-        r.triangle(centre, 0.05, [1e4, 1.1e4, 1.2e4])
+        let centre = direction(r, 0.3, 1.0);
+        triangle(r, centre, 0.05, [1e4, 1.1e4, 1.2e4])
     }),
     ("two misses", 0.05, |r| {
-        let centre = r.direction(0.3, 1.0);
-        r.triangle(centre, 0.05, [2.0, f64::INFINITY, f64::INFINITY])
+        let centre = direction(r, 0.3, 1.0);
+        triangle(r, centre, 0.05, [2.0, f64::INFINITY, f64::INFINITY])
     }),
     ("a nearly radial edge", 1e-4, |r| {
-        let centre = r.direction(0.3, 1.0);
-        let [first, second, _] = r.triangle(centre, 1e-4, [1.0, 20.0, 1.0]);
-        let [_, _, third] = r.triangle(centre, 0.1, [1.0, 1.0, 5.0]);
+        let centre = direction(r, 0.3, 1.0);
+        let [first, second, _] = triangle(r, centre, 1e-4, [1.0, 20.0, 1.0]);
+        let [_, _, third] = triangle(r, centre, 0.1, [1.0, 1.0, 5.0]);
         [first, second, third]
     }),
     ("at the horizon, cos 1e-4", 0.05, |r| {
@@ -272,7 +257,7 @@ fn long_edges_are_halved() {
     let nodes = gauss(24);
     let mut random = Random(11);
     for _ in 0..1000 {
-        let (a, b) = (random.direction(0.0, 0.3), random.direction(0.0, 0.3));
+        let (a, b) = (direction(&mut random, 0.0, 0.3), direction(&mut random, 0.0, 0.3));
         let (a, b) = (corner(a, random.between(0.5, 3.0)), corner(b, random.between(0.5, 3.0)));
         if dot(a.0.map(f64::from), b.0.map(f64::from)) < -0.999 {
             continue;

@@ -2,6 +2,7 @@
 //! to the bit. For stiff matrices f64 gives the small value by the exact determinant.
 
 use super::*;
+use halflight_test_support::Random;
 use std::vec::Vec;
 
 /// Matrices per class.
@@ -9,26 +10,10 @@ const COUNT: usize = 4096;
 /// Largest error of both eigenvalues, in units in the last place (2⁻²³ of the value).
 const ULPS: f64 = 4.0;
 
-/// xorshift64*.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    /// Rotated matrix with these eigenvalues.
-    fn turned(&mut self, [l, m]: [f64; 2]) -> [f32; 3] {
-        let (sin, cos) = (core::f64::consts::TAU * self.unit()).sin_cos();
-        [l * cos * cos + m * sin * sin, (l - m) * sin * cos, l * sin * sin + m * cos * cos].map(|x| x as f32)
-    }
+/// Rotated matrix with these eigenvalues.
+fn turned(random: &mut Random, [l, m]: [f64; 2]) -> [f32; 3] {
+    let (sin, cos) = (core::f64::consts::TAU * random.unit()).sin_cos();
+    [l * cos * cos + m * sin * sin, (l - m) * sin * cos, l * sin * sin + m * cos * cos].map(|x| x as f32)
 }
 
 type Class = (&'static str, fn(&mut Random) -> [f32; 3]);
@@ -37,15 +22,15 @@ const CLASSES: [Class; 14] = [
     ("random", |r| [r.signed() as f32, r.signed() as f32, r.signed() as f32]),
     ("1e3", |r| {
         let l = [1.0, 1e-3 * r.signed()];
-        r.turned(l)
+        turned(r, l)
     }),
     ("1e6", |r| {
         let l = [-1.0, 1e-6 * r.signed()];
-        r.turned(l)
+        turned(r, l)
     }),
     ("1e12", |r| {
         let l = [1.0, 1e-12 * r.signed()];
-        r.turned(l)
+        turned(r, l)
     }),
     ("equal", |r| {
         let l = r.signed() as f32;
@@ -53,7 +38,7 @@ const CLASSES: [Class; 14] = [
     }),
     ("1e-7 apart", |r| {
         let l = r.signed();
-        r.turned([l, l * (1.0 + 1e-7)])
+        turned(r, [l, l * (1.0 + 1e-7)])
     }),
     ("denormal", |r| [1e-42 * r.signed(), 1e-42 * r.signed(), 1e-42 * r.signed()].map(|x| x as f32)),
     ("1e-30", |r| [1e-30 * r.signed(), 1e-30 * r.signed(), 1e-30 * r.signed()].map(|x| x as f32)),

@@ -7,24 +7,13 @@ use crate::kernels::cells::{Borders, Cells, between};
 use crate::kernels::edge::flux;
 use crate::kernels::mesh::{AS_FAR, Mesh, Rule};
 use core::f64::consts::{FRAC_PI_4, TAU};
+use halflight_test_support::Random;
 use std::vec::Vec;
 
 /// Largest error of a hemisphere's gradient, rotation or Hessian, relative to its norm.
 const TOLERANCE: f64 = 1e-5;
 /// Largest difference between orders of summation, relative to the sum of all magnitudes.
 const ORDER: f64 = 1e-6;
-
-/// xorshift64*.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
 
 /// Shirley and Chiu's concentric map, lifted to the hemisphere.
 fn concentric([u, v]: [f64; 2]) -> [f64; 3] {

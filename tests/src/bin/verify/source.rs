@@ -40,7 +40,7 @@ const RULES: &[Rule] = &[
         because: "core and simd have neither std nor alloc",
     },
     Rule {
-        folders: &["core/src", "std-app/src", "tests/src", "tests/tests"],
+        folders: &["core/src", "std-app/src", "tests/src", "tests/tests", "tests/lab/src", "tests/support"],
         words: &["unsafe ", "unsafe{"],
         unless: &["\"unsafe"],
         because: "only simd/ may be unsafe",

@@ -3,9 +3,11 @@
 use super::*;
 use crate::Level;
 use crate::cache::irradiance::metric::{Metric, Settings};
-use crate::cache::irradiance::test_rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
 use crate::cache::irradiance::validity;
+use crate::cache::skies::{LIGHT, OPEN, SHADOW, Sky, WALLS, with_cells};
 use core::hint::black_box;
+use glam::{DVec2, DVec3};
+use halflight_test_support::{Random, Room};
 use std::println;
 use std::time::Instant;
 
@@ -25,11 +27,11 @@ fn errors<const M: usize>(
 ) -> [[f64; 2]; M] {
     let mut random = Random(17);
     let (mut off, mut size) = ([[0.0; 2]; M], [0.0; 2]);
-    with_tables(n, |tables| {
+    with_cells(n, |tables| {
         for _ in 0..RECEIVERS {
-            let at = [0.1 + 0.8 * random.unit(), 0.1 + 0.8 * random.unit()];
-            let truth = room.truth(at);
-            let gather = Gather::new(n, &mut random, |w| room.trace(at, w));
+            let at = DVec2::new(random.between(0.1, 0.9), random.between(0.1, 0.9));
+            let truth = room.derivatives(at);
+            let gather = Sky::of_room(n, &mut random, room, at);
             let parts =
                 |v: [f64; 5]| [v[0] * v[0] + v[1] * v[1], v[2] * v[2] + 2.0 * v[3] * v[3] + v[4] * v[4]];
             for (off, found) in off.iter_mut().zip(estimate(tables, &gather.hemisphere())) {
@@ -98,8 +100,8 @@ fn estimates_beside_the_truth() {
 #[test]
 fn one_radiance_is_flat_but_to_the_open_mesh() {
     let room = Room { square: None, ..SHADOW };
-    let (at, n) = ([0.3, 0.2], 16);
-    let gather = Gather::new(n, &mut Random(5), |w| room.trace(at, w));
+    let n = 16;
+    let gather = Sky::of_room(n, &mut Random(5), &room, DVec2::new(0.3, 0.2));
     let hemisphere = gather.hemisphere();
     assert_eq!(five(&closed_mesh(Level::detect(), &hemisphere)), [0.0; 5]);
     assert_eq!(five(&ward_heckbert(&hemisphere)), [0.0; 5]);
@@ -122,10 +124,10 @@ fn rotational_gradients_turn_the_receiver() {
     let (mut random, n) = (Random(23), 64);
     let mut off = [0.0f64; 3];
     let mut size = 0.0;
-    with_tables(n, |tables| {
+    with_cells(n, |tables| {
         for _ in 0..20 {
-            let at = [0.2 + 0.6 * random.unit(), 0.2 + 0.6 * random.unit()];
-            let gather = Gather::new(n, &mut random, |w| WALLS.trace(at, w));
+            let at = DVec2::new(random.between(0.2, 0.8), random.between(0.2, 0.8));
+            let gather = Sky::of_room(n, &mut random, &WALLS, at);
             let hemisphere = gather.hemisphere();
             let level = Level::detect();
             let found = [
@@ -136,7 +138,7 @@ fn rotational_gradients_turn_the_receiver() {
             for axis in 0..2 {
                 let turned = |sign: f64| {
                     let (sin, cos) = (sign * TURN).sin_cos();
-                    let n = if axis == 0 { [sin, 0.0, cos] } else { [0.0, sin, cos] };
+                    let n = if axis == 0 { DVec3::new(sin, 0.0, cos) } else { DVec3::new(0.0, sin, cos) };
                     WALLS.irradiance_of(at, n)
                 };
                 let truth = (turned(1.0) - turned(-1.0)) / (2.0 * TURN);
@@ -160,10 +162,10 @@ fn rotational_gradients_turn_the_receiver() {
 #[ignore = "prints times"]
 fn print_times() {
     for n in [16, 32, 64] {
-        let gather = Gather::new(n, &mut Random(2), |w| WALLS.trace([0.3, 0.4], w));
+        let gather = Sky::of_room(n, &mut Random(2), &WALLS, DVec2::new(0.3, 0.4));
         let hemisphere = gather.hemisphere();
         let settings = Settings::new(Metric::Halflight, 1.0);
-        with_tables(n, |tables| {
+        with_cells(n, |tables| {
             for level in Level::detect().and_below() {
                 let time = |work: &dyn Fn()| {
                     let mut best = f64::INFINITY;

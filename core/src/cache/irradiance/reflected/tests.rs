@@ -3,7 +3,8 @@
 use super::*;
 use crate::bsdf::{All, Bsdf, Conductor, Glossy, Plastic};
 use crate::cache::irradiance::SECTORS;
-use crate::cache::radiance::{Basis, GatherTables, LobeSettings, RecordCoefficients, ServedLobes, Sky};
+use crate::cache::radiance::{Basis, GatherTables, LobeSettings, RecordCoefficients, ServedLobes};
+use crate::cache::skies::Sky;
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Line};
 use crate::sampling::warp::cosine_hemisphere;

@@ -3,8 +3,8 @@
 use super::*;
 use crate::Level;
 use crate::cache::irradiance::CellFlux;
-use crate::cache::radiance::test_rooms::{Sky, with_tables};
 use crate::cache::radiance::zernike::{DEGREE_MAX, count, gradients, values};
+use crate::cache::skies::{Sky, with_strata};
 use crate::memory::{Arena, Line};
 use std::vec;
 
@@ -26,7 +26,7 @@ const WALLS: [f32; 5] = [1.0, 0.2, 0.5, 0.8, 0.3];
 
 #[test]
 fn one_radiance_and_a_sky_at_infinity_have_no_derivatives() {
-    with_tables(16, DEGREE_MAX, |tables| {
+    with_strata(16, DEGREE_MAX, |tables| {
         let walls = Sky::with_hits(16, |w| room(w, [0.7; 5]));
         let sky = Sky::new(16, |w| 1.0 + w[0] - 0.5 * w[2]);
         for sky in [walls, sky] {
@@ -46,7 +46,7 @@ fn degree_zero_is_the_derivative_of_the_irradiance() {
     let cells = CellFlux::build(N, &mut Arena::over(&mut lines)).unwrap();
     let sky = Sky::with_hits(N, |w| room(w, WALLS));
     let irradiance = cells.derivatives(Level::detect(), &sky.hemisphere()).unwrap();
-    with_tables(N, 4, |tables| {
+    with_strata(N, 4, |tables| {
         let found = border_flux(Level::detect(), tables, &sky.hemisphere()).unwrap();
         let root = core::f32::consts::PI.sqrt();
         for (found, wanted) in found.gradients.iter().zip(irradiance.gradient) {
@@ -88,7 +88,7 @@ fn derivatives_scale_with_lengths() {
         let (light, inverse, normal) = room(w, WALLS);
         (light, inverse / 1024.0, normal)
     });
-    with_tables(24, 6, |tables| {
+    with_strata(24, 6, |tables| {
         let near = border_flux(Level::detect(), tables, &near.hemisphere()).unwrap();
         let far = border_flux(Level::BASELINE, tables, &far.hemisphere()).unwrap();
         for k in 0..count(6) {
@@ -103,7 +103,7 @@ fn derivatives_scale_with_lengths() {
 #[test]
 fn gradients_without_occlusion_agree() {
     let sky = Sky::with_hits(64, |w| room(w, WALLS));
-    with_tables(64, 6, |tables| {
+    with_strata(64, 6, |tables| {
         let hemisphere = sky.hemisphere();
         let flux = border_flux(Level::detect(), tables, &hemisphere).unwrap().gradients;
         let analytic = unoccluded(tables, &hemisphere).unwrap();

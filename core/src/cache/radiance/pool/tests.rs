@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::cache::radiance::derivatives::border_flux;
-use crate::cache::radiance::test_rooms::{Sky, with_tables};
 use crate::cache::radiance::zernike::{COUNT_MAX, count};
+use crate::cache::skies::{Sky, with_strata};
 use crate::memory::Line;
 use std::vec;
 
@@ -11,7 +11,7 @@ use std::vec;
 fn light(degree: usize, scale: f32) -> (Coefficients, Gradients) {
     let sky =
         Sky::with_hits(32, |w| (scale * (0.4 + 0.3 * w[0] + w[1] * w[1]), 1.0 + w[0], [0.0, 0.0, -1.0]));
-    with_tables(32, degree, |tables| {
+    with_strata(32, degree, |tables| {
         let mut found = Coefficients::project(Level::detect(), tables, &sky.hemisphere()).unwrap();
         found.values[2] = found.values[2].map(|value| 0.1 * value);
         (found, border_flux(Level::detect(), tables, &sky.hemisphere()).unwrap().gradients)

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Level;
-use crate::cache::radiance::test_rooms::Sky;
+use crate::cache::skies::Sky;
 use crate::memory::{Arena, Line};
 use core::f32::consts::TAU;
 use glam::{Mat3, Vec3};
