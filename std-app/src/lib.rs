@@ -26,6 +26,9 @@ pub mod memory;
 mod pages;
 pub mod picture;
 pub mod render;
+mod renderer;
 pub mod report;
 pub mod save;
 pub mod stability;
+
+pub use renderer::{Camera, Renderer};

@@ -1,17 +1,16 @@
 //! Studies of irradiance caching: errors of each metric at the same number of records, at held-out points of
 //! the picture.
 
+use super::built::{Built, BuiltMemory};
 use super::deadline::End;
 use super::held_out::{EXACT, Point, held_out, luminance};
 use super::memory::{Bank, Memory};
-use super::run::{build_bvh, path_settings};
+use super::run::path_settings;
 use super::survey::means;
-use super::threads::{Threads, Workers};
+use super::threads::{Pool, Threads, Workers};
 use super::{RenderError, Settings};
-use crate::pages::Pages;
 use halflight_core::bsdf::{All, Features};
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
-use halflight_core::light::LightSampler;
 use halflight_core::memory::Arena;
 use halflight_core::method::irradiance_cache::LEAST_PIXELS;
 use halflight_core::method::record_placement::{CacheBuilder, RecordPlacement, step_footprint, step_points};
@@ -92,15 +91,12 @@ struct Study<'a> {
 impl Study<'_> {
     fn run<F: Features>(self) -> Result<(), RenderError> {
         let Study { scene, settings, study, tell } = self;
-        let workers = Workers::new(settings.threads)?;
+        let (pool, owner) = (Pool::new(settings.threads)?, BuiltMemory::default());
+        let workers = Workers::new(&pool);
+        let built = Built::new(scene, (settings.level, settings.memory), &pool, &owner)?;
         let bank = Bank::new();
-        let mut memory = Memory::new(scene, settings, &bank);
-        let mut bvh_lines = Pages::default();
-        let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
-        let mut lights_lines =
-            memory.take("lights", LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
-        let lights =
-            LightSampler::build(scene, &mut Arena::over(&mut lights_lines))?.with_level(settings.level);
+        let mut memory = Memory::new(scene, settings, &bank).beside(&built)?;
+        let (bvh, lights) = (built.bvh, built.lights.with_level(settings.level));
         let tracer = PathIntegrator::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let strata = settings.cache.strata() as usize;
         let scratch =
