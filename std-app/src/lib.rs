@@ -1,19 +1,21 @@
 //! The halflight app: loads scenes, renders them with all processors, saves pictures and reports.
 //!
-//! A picture takes four steps: [`load`] a scene, choose a camera, [`render`] the picture, [`save`] the image.
-//! [`compare`] computes the difference between two images, [`report`] describes a render.
+//! [`Renderer`] owns a loaded scene, its hierarchy, lights and threads, and renders many views of it. [`load`]
+//! reads scenes from files, [`load::SceneParts`] makes them from arrays, [`render`] has the settings and
+//! results, [`save`] writes pictures. [`compare`] computes the difference between two pictures, [`report`]
+//! describes a render.
 //!
 //! ```no_run
-//! use core::sync::atomic::AtomicBool;
-//! use halflight::render::{Settings, render};
-//! use halflight::{load, save};
+//! use halflight::render::{Settings, Stop};
+//! use halflight::{Renderer, save};
 //!
-//! let loaded = load::load("scenes/cornell/cornell.obj".as_ref(), &load::LoadOptions::default())?;
-//! let views = loaded.views();
-//! let scene = views.scene(loaded.camera_or_default());
-//! let interrupt = AtomicBool::new(false);
-//! let result = render(&scene, &Settings::default(), &mut |_| {}, &interrupt)?;
-//! save::write("cornell.png".as_ref(), &result.image)?;
+//! let renderer = Renderer::open("scenes/cornell/cornell.obj")?;
+//! let stop = Stop { error: Some(1e-3), ..Stop::default() };
+//! let picture = renderer.render(&Settings { stop, ..Settings::default() })?;
+//! save::write("cornell.png".as_ref(), &picture.image)?;
+//! if let Some(error) = picture.error {
+//!     println!("relMSE {:.1e}, 95 %: {:.1e} to {:.1e}", error.relmse, error.lower, error.upper);
+//! }
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
@@ -25,5 +27,8 @@ pub mod memory;
 pub mod pages;
 pub mod picture;
 pub mod render;
+mod renderer;
 pub mod report;
 pub mod save;
+
+pub use renderer::{Camera, Renderer};

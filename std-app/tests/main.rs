@@ -15,4 +15,5 @@ mod picture_files;
 mod pictures;
 #[cfg(unix)]
 mod pipes;
+mod renderer;
 mod support;

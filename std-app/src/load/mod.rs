@@ -20,6 +20,7 @@ mod name;
 mod notes;
 pub mod obj;
 mod open_glass;
+mod parts;
 mod relief;
 mod scene;
 pub mod scene_file;
@@ -35,6 +36,7 @@ pub use error::LoadError;
 pub use map::{Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
+pub use parts::{MaterialId, PartMesh, SceneParts};
 pub use scene::{LoadedScene, RenderSettings, SceneViews, View};
 pub use texture_set::TextureSet;
 pub use transform::{SceneTransform, direction};
@@ -108,6 +110,8 @@ struct SceneBuilder {
     /// Index into `objs` of each OBJ file; a file is read once, however often it is placed.
     obj_numbers: HashMap<PathBuf, usize>,
     materials: Vec<MtlMaterial>,
+    /// Materials of the core that take the places of those, by index.
+    given: HashMap<u32, Material>,
     /// Index of each material by OBJ file (`None`: the scene file) and name.
     material_numbers: HashMap<(Option<usize>, Name), u32>,
     /// Changes by the scene file, by name of the material.
@@ -133,6 +137,7 @@ impl SceneBuilder {
             objs: Vec::new(),
             obj_numbers: HashMap::new(),
             materials: Vec::new(),
+            given: HashMap::new(),
             material_numbers: HashMap::new(),
             overrides: BTreeMap::new(),
             used_overrides: BTreeSet::new(),
@@ -256,8 +261,11 @@ impl SceneBuilder {
             Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
         };
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
-        let materials: Vec<Material> =
-            self.materials.iter().map(|mtl| surface::resolve(mtl, &mut textures, notes)).collect();
+        let resolved = |(number, mtl): (u32, &MtlMaterial)| match self.given.get(&number) {
+            Some(material) => *material,
+            None => surface::resolve(mtl, &mut textures, notes),
+        };
+        let materials: Vec<Material> = (0..).zip(&self.materials).map(resolved).collect();
         let environment = environment.map(|entry| Environment {
             radiance: entry.radiance,
             map: textures.colour(entry.map.as_ref()),

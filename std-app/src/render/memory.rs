@@ -1,6 +1,7 @@
 //! Memory of arenas: counted, checked against the limit, and requested from the system without aborting on
 //! failure.
 
+use super::built::Built;
 use super::{RenderError, Settings};
 use crate::compare::working_bytes;
 use crate::memory::{self, Budget};
@@ -39,16 +40,33 @@ pub(super) struct Memory<'m> {
 impl<'m> Memory<'m> {
     /// Counts as taken: the buffers of `scene`, and the reference with the memory of comparisons.
     pub(super) fn new(scene: &Scene, settings: &Settings, bank: &'m Bank) -> Self {
-        let limit = settings.memory;
-        let hard_limit = Budget::new(limit).limit();
-        let mut uses = vec![MemoryUse { structure: "scene", bytes: scene_bytes(scene) }];
+        let mut memory = Self::of_scene(scene, settings.memory, bank);
         if let Some(reference) = &settings.reference {
             let bytes = size_of_val(&reference.pixels[..]) + working_bytes(reference);
-            uses.push(MemoryUse { structure: "reference", bytes });
+            memory.count("reference", Footprint::default().slice::<u8>(bytes));
         }
+        memory
+    }
+
+    /// Counts the buffers of `scene` as taken.
+    pub(super) fn of_scene(scene: &Scene, limit: Option<usize>, bank: &'m Bank) -> Self {
+        let hard_limit = Budget::new(limit).limit();
+        let uses = vec![MemoryUse { structure: "scene", bytes: scene_bytes(scene) }];
         let memory = Self { bank, shorter: Bank::new(), limit, hard_limit, uses, peak: Rc::default() };
         memory.peak.set(memory.total());
         memory
+    }
+
+    /// Counts the structures of `built` as taken, but not the scene again.
+    ///
+    /// # Errors
+    /// Insufficient memory.
+    pub(super) fn beside(mut self, built: &Built) -> Result<Self, RenderError> {
+        for of_built in built.uses.iter().filter(|of_built| of_built.structure != "scene") {
+            self.set_aside(of_built.structure, Footprint::default().slice::<u8>(of_built.bytes))?;
+        }
+        self.peak.set(self.peak.get().max(built.peak));
+        Ok(self)
     }
 
     /// Bytes available for reading a file.

@@ -8,7 +8,7 @@ use super::film_file::Reader;
 use super::method::Method;
 use super::picture::image;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
-use super::threads::Workers;
+use super::threads::{Pool, Workers};
 use crate::memory::{Budget, lines};
 use crate::save::Image;
 use halflight_core::memory::Arena;
@@ -81,7 +81,8 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         seconds += film.header.seconds;
         film.read_into(&mut state)?;
     }
-    let workers = Workers::new(None)?;
+    let pool = Pool::new(None)?;
+    let workers = Workers::new(&pool);
     let report = ErrorReport::with(&workers, &state, |noise| {
         let (mean, audits) = workers.mean(&state.film).zip(audits)?;
         audit::State::merged(audits, &state.film, mean)?.verdict(&state.film, mean, noise)

@@ -6,6 +6,7 @@
 //! after which the render is resumed from its film file.
 
 mod audit;
+mod built;
 mod cache_file;
 mod deadline;
 mod environment_visibility;
@@ -30,6 +31,7 @@ mod survey;
 mod threads;
 
 pub use audit::{Audited, Region};
+pub(crate) use built::{Built, BuiltMemory};
 pub use cache_file::inspect as inspect_cache;
 pub use error::{FileError, RenderError};
 pub use error_report::NoiseAndBlur;
@@ -46,11 +48,14 @@ pub use merge::{Merged, merge};
 pub use method::{Basis, CacheSettings, LobeSettings, MapView, Method, PhotonSettings, PhotonView};
 pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
+pub(crate) use run::Request;
 pub use run::render;
 pub use survey::{Check, Mark, Survey, SurveyPixel};
+pub(crate) use threads::Pool;
 
 use crate::save::Image;
 use halflight_core::Level;
+use halflight_core::film::Film;
 use halflight_core::findings::Findings;
 use halflight_core::transport::Counters;
 use std::path::PathBuf;
@@ -173,7 +178,7 @@ impl Default for Settings {
 
 /// State of a render, after each round and while its audit continues alone.
 #[derive(Clone, Debug)]
-pub struct Progress {
+pub struct Progress<'a> {
     /// Seconds of rendering so far.
     pub seconds: f64,
     /// Estimated seconds left; `None` if unknown.
@@ -186,6 +191,15 @@ pub struct Progress {
     pub error: Option<ErrorEstimate>,
     /// A failed write of a film or a cache, reported once per file: the render continues and retries.
     pub unsaved: Option<FileError>,
+    /// The film so far.
+    pub(crate) film: Option<&'a Film<'a>>,
+}
+
+impl Progress<'_> {
+    /// The picture so far, which is made by this call: pixels without samples are black.
+    pub fn picture(&self) -> Option<Image> {
+        self.film.map(picture::image)
+    }
 }
 
 /// Why rendering ended.

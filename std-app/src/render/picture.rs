@@ -165,8 +165,9 @@ impl<'a> Progressive<'a> {
             self.saved = Instant::now();
         }
         let unsaved = self.kept.new_failure().or_else(|| renderer.kept()?.new_failure());
-        let known = Progress { unsaved, ..self.rounds.progress(seconds, self.latest) };
-        let Picture { clock, progress, .. } = &mut self.picture;
+        let Picture { clock, progress, state, .. } = &mut self.picture;
+        let known =
+            Progress { unsaved, film: Some(&state.film), ..self.rounds.progress(seconds, self.latest) };
         clock.pause(|| progress(&known));
         Ok(())
     }

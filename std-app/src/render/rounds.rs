@@ -205,9 +205,17 @@ impl Rounds {
     }
 
     /// Progress to report at `seconds`.
-    pub(super) fn progress(&self, seconds: f64, error: Option<ErrorEstimate>) -> Progress {
+    pub(super) fn progress(&self, seconds: f64, error: Option<ErrorEstimate>) -> Progress<'static> {
         let seconds_left = self.seconds_left(seconds, error);
-        Progress { seconds, seconds_left, spp: self.spp, rounds: self.count, error, unsaved: None }
+        Progress {
+            seconds,
+            seconds_left,
+            spp: self.spp,
+            rounds: self.count,
+            error,
+            unsaved: None,
+            film: None,
+        }
     }
 
     /// Estimated seconds until the first rule holds: errors fall with 1 over the number of samples.

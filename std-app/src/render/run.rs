@@ -1,64 +1,112 @@
 //! A render from its settings to its result: checks, structures, method, and the rounds of the picture.
 
 use super::audit::Audit;
+use super::built::{Built, BuiltMemory};
 use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{self, Attempt, Method, RenderSetup};
 use super::picture::{self, Picture};
-use super::threads::Workers;
+use super::threads::{Pool, Workers};
 use super::{
     Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file,
     environment_visibility, gaps,
 };
-use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
-use halflight_core::Level;
 use halflight_core::bsdf::Features;
-use halflight_core::bvh::Bvh;
 use halflight_core::census::{Census, WithFeatures};
 use halflight_core::film::Tile;
 use halflight_core::findings::Decision::LeftOut;
 use halflight_core::findings::{Finding, Findings};
-use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, MemorySource};
 use halflight_core::method::{MethodPlan, RenderState, Shard};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, UNLIMITED};
-use std::time::Instant;
 
 /// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. The calling thread calls
-/// `progress` after each round, outside the measured time.
+/// `progress` after each round, outside the measured time. [`crate::Renderer`] renders several views of a scene
+/// with one build.
 pub fn render(
     scene: &Scene,
     settings: &Settings,
     progress: &mut dyn FnMut(&Progress),
     interrupt: &AtomicBool,
 ) -> Result<RenderResult, RenderError> {
-    let pixels = u64::from(settings.width) * u64::from(settings.height);
-    if !(1..=MOST_PIXELS).contains(&pixels) {
-        return Err(RenderError::Size);
+    let request = Request::open(scene, settings)?;
+    let (pool, owner) = (Pool::new(settings.threads)?, BuiltMemory::default());
+    let built = Built::new(scene, (settings.level, settings.memory), &pool, &owner)?;
+    request.render(&built, &pool, progress, interrupt)
+}
+
+/// A picture that is asked for, after its settings and files were checked.
+pub(crate) struct Request<'a> {
+    scene: &'a Scene<'a>,
+    settings: &'a Settings,
+    method: Method,
+    /// Fingerprint of the cache file.
+    cache: Option<String>,
+    resumed: Option<Reader>,
+}
+
+impl<'a> Request<'a> {
+    /// Checks `settings` and the files that they name: those of another scene are refused before any structure
+    /// is built.
+    pub(crate) fn open(scene: &'a Scene<'a>, settings: &'a Settings) -> Result<Self, RenderError> {
+        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        if !(1..=MOST_PIXELS).contains(&pixels) {
+            return Err(RenderError::Size);
+        }
+        let size = [settings.width, settings.height];
+        if settings.reference.as_ref().is_some_and(|reference| [reference.width, reference.height] != size) {
+            return Err(RenderError::Reference);
+        }
+        let Shard { index, count } = settings.shard;
+        let many = count as usize > Tile::count(settings.width, settings.height);
+        if index >= count || many {
+            return Err(RenderError::Shard);
+        }
+        let bank = Bank::new();
+        let most = Memory::new(scene, settings, &bank).for_file();
+        let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
+        let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
+        // A film file holds the method that prepasses chose.
+        let of_film = resumed.as_ref().and_then(|film| film.header.method());
+        let usual = Method::named(Census::of(scene).plan().method).unwrap_or(Method::Path);
+        let method = settings.method.or(of_film).unwrap_or(usual);
+        let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
+        if keeps_cache && !method.has_records() {
+            return Err(RenderError::NoCache);
+        }
+        let request = Self { scene, settings, method, cache, resumed };
+        if let Some(film) = &request.resumed {
+            film.check(&request.identity(method), settings.shard)?;
+        }
+        Ok(request)
     }
-    let size = [settings.width, settings.height];
-    if settings.reference.as_ref().is_some_and(|reference| [reference.width, reference.height] != size) {
-        return Err(RenderError::Reference);
+
+    fn identity(&self, method: Method) -> Identity {
+        Identity::of(self.scene, method, &path_settings(self.settings), self.settings, self.cache.clone())
     }
-    let Shard { index, count } = settings.shard;
-    let many = count as usize > Tile::count(settings.width, settings.height);
-    if index >= count || many {
-        return Err(RenderError::Shard);
+
+    /// Renders with the structures of the scene in code for its features.
+    pub(crate) fn render(
+        self,
+        built: &Built,
+        pool: &Pool,
+        progress: &mut dyn FnMut(&Progress),
+        interrupt: &AtomicBool,
+    ) -> Result<RenderResult, RenderError> {
+        let features = Census::of(self.scene).plan().features;
+        features.dispatch(Render { request: self, built, pool, progress, interrupt })
     }
-    let plan = Census::of(scene).plan();
-    let method = settings.method.or(Method::named(plan.method)).unwrap_or(Method::Path);
-    plan.features.dispatch(Render { scene, settings, method, progress, interrupt })
 }
 
 /// A render, to be compiled for the features of its scene.
 struct Render<'a> {
-    scene: &'a Scene<'a>,
-    settings: &'a Settings,
-    method: Method,
+    request: Request<'a>,
+    built: &'a Built<'a>,
+    pool: &'a Pool,
     progress: &'a mut dyn FnMut(&Progress),
     interrupt: &'a AtomicBool,
 }
@@ -67,47 +115,24 @@ impl WithFeatures for Render<'_> {
     type Out = Result<RenderResult, RenderError>;
 
     fn run<F: Features>(self) -> Self::Out {
-        let Render { scene, settings, method, progress, interrupt } = self;
+        let Render { mut request, built, pool, progress, interrupt } = self;
+        let mut resumed = request.resumed.take();
+        let Request { scene, settings, method, .. } = request;
         let (width, height) = (settings.width, settings.height);
-        // Files of another scene are refused before any structure is built.
         let bank = Bank::new();
-        let mut memory = Memory::new(scene, settings, &bank);
-        let most = memory.for_file();
-        let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
-        let mut resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
-        // A film file holds the method that prepasses chose.
-        let of_film = resumed.as_ref().and_then(|film| film.header.method());
-        let method = settings.method.or(of_film).unwrap_or(method);
-        let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
-        if keeps_cache && !method.has_records() {
-            return Err(RenderError::NoCache);
-        }
-        let identity =
-            |method: Method| Identity::of(scene, method, &path_settings(settings), settings, cache.clone());
-        if let Some(film) = &resumed {
-            film.check(&identity(method), settings.shard)?;
-        }
-
-        let workers = Workers::new(settings.threads)?;
-        let build_start = Instant::now();
-        // The BVH comes first: its build needs working memory that later structures reuse.
-        let mut bvh_lines = Pages::default();
-        let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
+        let mut memory = Memory::new(scene, settings, &bank).beside(built)?;
         let mut film_lines = memory.take("film", RenderState::footprint(width, height))?;
         // Output images are counted now and allocated at the end.
         let pixels = width as usize * height as usize;
         let picture = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
         memory.set_aside("picture", picture.slice::<u32>(pixels))?;
-        let mut lights_lines =
-            memory.take("lights", LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
-        let lights = LightSampler::build(scene, &mut Arena::over(&mut lights_lines))?;
+        let Built { bvh, lights, seconds: build, .. } = *built;
         let lights = lights.with_level(settings.level);
-        let build = build_start.elapsed().as_secs_f64();
 
         let mut clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
         let left =
             settings.stop.seconds.map(|limit| limit - clock.seconds() - picture::ending_seconds(pixels));
-        let workers = workers.ending_at(Deadline::until(interrupt).within(left));
+        let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(left));
         let plain = RenderSetup { scene, bvh, lights, settings, workers: &workers };
         let affords_pilots = method != Method::Path || plain.goal().affords_pilots(pixels);
         let hurried = (!affords_pilots).then(|| without_pilots(settings));
@@ -122,26 +147,24 @@ impl WithFeatures for Render<'_> {
         let mut may_fall_back = is_open;
         loop {
             let mut own = memory.within();
-            let attempt = method::set_up::<F>(plan, &setup, &mut own).and_then(|attempt| match attempt {
-                Attempt::Ready(renderer) => {
-                    let audit = Audit::new::<F>(&setup, &mut own, renderer.chosen())?;
-                    Ok(Ok((renderer, audit)))
-                }
-                Attempt::Instead(better) => Ok(Err(better)),
-            });
-            let (mut renderer, audit) = match attempt {
-                Ok(Ok(ready)) => ready,
-                Ok(Err(better)) => {
+            let ready = match method::set_up::<F>(plan, &setup, &mut own) {
+                Ok(Attempt::Instead(better)) => {
                     plan = better;
                     continue;
                 }
+                Ok(Attempt::Ready(renderer)) => {
+                    Audit::new::<F>(&setup, &mut own, renderer.chosen()).map(|audit| (renderer, audit))
+                }
+                Err(error) => Err(error),
+            };
+            let (mut renderer, audit) = match ready {
                 // A method that was chosen may need more memory than path tracing.
                 Err(RenderError::Memory { .. }) if may_fall_back => {
                     may_fall_back = false;
                     plan = Method::Path.into();
                     continue;
                 }
-                Err(error) => return Err(error),
+                ready => ready?,
             };
             let method = renderer.chosen();
             let picture = Picture {
@@ -149,7 +172,7 @@ impl WithFeatures for Render<'_> {
                 setup,
                 state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
                 audit,
-                identity: identity(method),
+                identity: request.identity(method),
                 resumed: resumed.take(),
                 clock: &mut clock,
                 sketch: &sketch,
@@ -166,13 +189,8 @@ impl WithFeatures for Render<'_> {
             let pilots =
                 (!affords_pilots).then(|| Finding::new("pilots", LeftOut, "there is too little time"));
             let findings = Findings::default().and(pilots).and(visibility).and(done.findings);
-            return Ok(RenderResult {
-                memory: own.uses(),
-                memory_peak: own.peak(),
-                seconds,
-                findings,
-                ..done
-            });
+            let (memory, memory_peak) = (own.uses(), own.peak());
+            return Ok(RenderResult { memory, memory_peak, seconds, findings, ..done });
         }
     }
 }
@@ -197,21 +215,4 @@ fn without_pilots(settings: &Settings) -> Settings {
 pub(super) fn path_settings(settings: &Settings) -> PathSettings {
     let Settings { width, height, seed, max_depth, .. } = *settings;
     PathSettings { width, height, seed, max_depth: max_depth.unwrap_or(UNLIMITED) }
-}
-
-/// BVH, built on all cores, then moved from its working memory into `lines`.
-pub(super) fn build_bvh<'m>(
-    scene: &Scene,
-    level: Level,
-    workers: &Workers,
-    memory: &mut Memory,
-    lines: &'m mut Pages,
-) -> Result<Bvh<'m>, RenderError> {
-    let mut working = memory.take_pages("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
-    let mut arena = Arena::over(&mut working);
-    let built = workers.build_bvh(&scene.mesh, level, &mut arena)?;
-    *lines = memory.take_pages("bvh", built.used())?;
-    let bvh = built.copied(&mut Arena::over(lines))?;
-    memory.give_back("bvh build");
-    Ok(bvh)
 }

@@ -15,22 +15,46 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 /// A pool of threads.
+pub(crate) struct Pool(ThreadPool);
+
+impl Pool {
+    /// A pool of `threads` threads; `None`: all of the machine.
+    pub(crate) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+        pool.map(Self).map_err(|error| RenderError::Threads(error.to_string()))
+    }
+
+    /// Builds the BVH of `mesh` on all threads.
+    pub(super) fn build_bvh<'m>(
+        &self,
+        mesh: &Mesh,
+        level: Level,
+        arena: &mut Arena<'m>,
+    ) -> Result<Bvh<'m>, OutOfMemory> {
+        self.0.install(|| Bvh::build_with(mesh, arena, level, self))
+    }
+}
+
+impl ForkJoin for Pool {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        self.0.join(a, b);
+    }
+}
+
+/// The threads of a pool at work on one picture.
 pub(super) struct Workers<'w> {
-    /// End of its passes.
+    /// End of their passes.
     pub(super) deadline: Deadline<'w>,
     /// Pool, and fork-join on it.
-    pub(super) fork: Fork,
+    pub(super) pool: &'w Pool,
     /// Seconds of each phase of the render.
     phases: Mutex<Vec<(&'static str, f64)>>,
 }
 
 impl<'w> Workers<'w> {
-    /// A pool of `threads` threads; `None`: all of the machine.
-    pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
-        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-        let phases = Mutex::default();
-        pool.map(|pool| Self { fork: Fork(pool), deadline: Deadline::default(), phases })
-            .map_err(|error| RenderError::Threads(error.to_string()))
+    /// The threads of `pool`.
+    pub(super) fn new(pool: &'w Pool) -> Self {
+        Self { pool, deadline: Deadline::default(), phases: Mutex::default() }
     }
 
     /// A pool whose passes end at `deadline`.
@@ -55,22 +79,12 @@ impl<'w> Workers<'w> {
 
     /// Number of threads.
     pub(super) fn count(&self) -> usize {
-        self.fork.0.current_num_threads()
+        self.pool.0.current_num_threads()
     }
 
     /// Runs `work` on the pool, whose threads take the parts of its parallel iterators.
     pub(super) fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
-        self.fork.0.install(work)
-    }
-
-    /// Builds the BVH of `mesh` on all threads.
-    pub(super) fn build_bvh<'m>(
-        &self,
-        mesh: &Mesh,
-        level: Level,
-        arena: &mut Arena<'m>,
-    ) -> Result<Bvh<'m>, OutOfMemory> {
-        self.install(|| Bvh::build_with(mesh, arena, level, &self.fork))
+        self.pool.0.install(work)
     }
 
     /// Runs `work` once on every thread, each with its own working memory. The parallel iterator is compiled
@@ -92,18 +106,9 @@ impl<'w> Workers<'w> {
     }
 }
 
-/// Forks on the threads of a pool.
-pub(super) struct Fork(ThreadPool);
-
-impl ForkJoin for Fork {
-    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
-        self.0.join(a, b);
-    }
-}
-
 /// Forks of builds, which end as passes do.
 pub(super) struct Branches<'t> {
-    fork: &'t Fork,
+    fork: &'t Pool,
     deadline: &'t Deadline<'t>,
     end: End,
 }
@@ -128,7 +133,7 @@ pub(super) struct Threads<'t> {
 impl<'t> Threads<'t> {
     /// For passes before or beside the picture.
     pub(super) fn new(workers: &'t Workers<'t>, scratch: &'t mut [Vec<Line>]) -> Self {
-        let branches = Branches { fork: &workers.fork, deadline: &workers.deadline, end: End::Prepass };
+        let branches = Branches { fork: workers.pool, deadline: &workers.deadline, end: End::Prepass };
         Self { workers, scratch, branches }
     }
 
@@ -282,7 +287,8 @@ mod tests {
     #[test]
     fn a_pass_writes_every_piece_once_and_counts() {
         for threads in [1, 3] {
-            let workers = Workers::new(Some(threads)).unwrap();
+            let pool = Pool::new(Some(threads)).unwrap();
+            let workers = Workers::new(&pool);
             let mut scratch = vec![vec![]; threads];
             let mut executor = Threads::new(&workers, &mut scratch);
             let mut out = [0; 23];
@@ -299,7 +305,8 @@ mod tests {
     #[test]
     fn an_interrupt_ends_a_pass_and_a_fraction_of_no_time_ends_its_work_alone() {
         let flag = AtomicBool::new(false);
-        let workers = Workers::new(Some(2)).unwrap().ending_at(Deadline::until(&flag).within(Some(3600.0)));
+        let pool = Pool::new(Some(2)).unwrap();
+        let workers = Workers::new(&pool).ending_at(Deadline::until(&flag).within(Some(3600.0)));
         let mut scratch = vec![vec![]; 2];
         let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
         let is_complete = |executor: &mut Threads| {
@@ -314,7 +321,8 @@ mod tests {
     #[test]
     fn an_interrupt_ends_the_build_of_a_photon_map() {
         let flag = AtomicBool::new(false);
-        let workers = Workers::new(Some(2)).unwrap().ending_at(Deadline::until(&flag));
+        let pool = Pool::new(Some(2)).unwrap();
+        let workers = Workers::new(&pool).ending_at(Deadline::until(&flag));
         let mut scratch = vec![vec![]; 2];
         let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
         let (count, piece) = (1 << 15, 1 << 10);
@@ -345,7 +353,7 @@ mod tests {
 
         let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
         let mut arena = Arena::over(&mut lines);
-        let bvh = Workers::new(Some(threads)).unwrap().build_bvh(&mesh, Level::detect(), &mut arena).unwrap();
+        let bvh = Pool::new(Some(threads)).unwrap().build_bvh(&mesh, Level::detect(), &mut arena).unwrap();
         let mut kept = vec![Line([0; 64]); bvh.used().bytes() / 64];
         bvh.copied(&mut Arena::over(&mut kept)).unwrap();
         bytemuck::cast_slice(&kept).to_vec()

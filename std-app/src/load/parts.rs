@@ -1,0 +1,170 @@
+//! A scene from arrays, with the repairs and notes of the loader.
+
+use super::geometry::Placement;
+use super::obj::{Group, Obj};
+use super::scene_file::EnvironmentChange;
+use super::{
+    LoadError, LoadOptions, LoadedScene, PlacedMesh, SceneBuilder, View, memory_estimate, too_large,
+};
+use glam::{DVec3, Mat3};
+use halflight_core::Rgb;
+use halflight_core::scene::{Material, PointLight};
+use std::path::Path;
+
+/// A material of [`SceneParts`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaterialId(u32);
+
+/// Triangles of one material, in arrays of the caller.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PartMesh<'a> {
+    /// Vertex positions.
+    pub positions: &'a [[f64; 3]],
+    /// Shading normals of any length, one for each position, or empty.
+    pub normals: &'a [[f64; 3]],
+    /// Texture coordinates, one for each position, or empty.
+    pub texcoords: &'a [[f64; 2]],
+    /// Indices of vertices, counter-clockwise seen from the front.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// Meshes, materials, lights and a view, from which the loader makes a scene: it centres and scales, repairs
+/// normals and triangles, and notes what it changes.
+///
+/// ```
+/// use halflight::load::{PartMesh, SceneParts, View};
+/// use halflight::Renderer;
+/// use halflight_core::Rgb;
+/// use halflight_core::scene::{Material, PointLight};
+///
+/// let mut parts = SceneParts::default();
+/// let white = parts.material("white", Material::diffuse(Rgb::splat(0.7)));
+/// let positions = [[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]];
+/// let triangles = [[0, 1, 2], [0, 2, 3]];
+/// parts.mesh("floor", &PartMesh { positions: &positions, triangles: &triangles, ..PartMesh::default() }, white)?;
+/// parts.light(PointLight::Point { position: [0.0, 2.0, 0.0].into(), intensity: Rgb::splat(10.0) });
+/// parts.view(View { eye: [0.0, 1.0, 3.0], look_at: [0.0; 3], up: [0.0, 1.0, 0.0] }, 40.0);
+/// let renderer = Renderer::new(parts.build()?, None)?;
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+pub struct SceneParts {
+    builder: SceneBuilder,
+    options: LoadOptions,
+    lights: Vec<PointLight>,
+    environment: Option<Rgb>,
+    view: Option<(View, f64)>,
+}
+
+impl Default for SceneParts {
+    fn default() -> Self {
+        Self::new(LoadOptions::default())
+    }
+}
+
+impl SceneParts {
+    /// No parts yet; `options` limit the memory.
+    pub fn new(options: LoadOptions) -> Self {
+        let builder = SceneBuilder::new(&options);
+        Self { builder, options, lights: Vec::new(), environment: None, view: None }
+    }
+
+    /// Adds a material, or changes the one of this name.
+    pub fn material(&mut self, name: &str, material: Material) -> MaterialId {
+        let number = self.builder.material(None, name.into(), None);
+        self.builder.given.insert(number, material);
+        MaterialId(number)
+    }
+
+    /// Adds a mesh of one material.
+    ///
+    /// # Errors
+    /// A [`LoadError`] with the name of the mesh where an index is out of range, or normals or texture
+    /// coordinates are neither empty nor as many as positions; insufficient memory.
+    pub fn mesh(&mut self, name: &str, mesh: &PartMesh, material: MaterialId) -> Result<(), LoadError> {
+        let file = Path::new(name);
+        let count = mesh.positions.len();
+        let lists = [("normals", mesh.normals.len()), ("texture coordinates", mesh.texcoords.len())];
+        for (list, length) in lists.into_iter().filter(|(_, length)| *length != 0 && *length != count) {
+            let problem = format!("the mesh has {length} {list} and {count} positions");
+            return Err(LoadError::of_file(file, problem, "give one for each position, or none"));
+        }
+        let is_out = |triangle: &[u32; 3]| triangle.iter().any(|&vertex| vertex as usize >= count);
+        if let Some(triangle) = mesh.triangles.iter().position(is_out) {
+            let problem = format!("triangle {triangle} refers to a vertex that does not exist");
+            return Err(LoadError::of_file(
+                file,
+                problem,
+                format!("indices are below {count}, and begin at 0"),
+            ));
+        }
+        let group = Group {
+            material: Some(0),
+            positions: mesh.positions.to_vec(),
+            normals: mesh.normals.to_vec(),
+            texcoords: mesh.texcoords.to_vec(),
+            triangles: mesh.triangles.to_vec(),
+        };
+        let obj = Obj { groups: vec![group], materials: vec![name.into()], ..Obj::default() };
+        let builder = &mut self.builder;
+        builder.budget.take(memory_estimate::of_mesh(&obj)).map_err(|why| too_large(file, &why))?;
+        builder.objs.push(obj);
+        let materials = [material.0, material.0].into();
+        builder.meshes.push(PlacedMesh {
+            obj: builder.objs.len() - 1,
+            placement: Placement::IDENTITY,
+            materials,
+        });
+        Ok(())
+    }
+
+    /// Adds a light without surface, in the coordinates and units of the meshes.
+    pub fn light(&mut self, light: PointLight) {
+        self.lights.push(light);
+    }
+
+    /// Gives rays that leave the scene this radiance.
+    pub fn environment(&mut self, radiance: Rgb) {
+        self.environment = Some(radiance);
+    }
+
+    /// Sets the camera.
+    pub fn view(&mut self, view: View, fov_degrees: f64) {
+        self.view = Some((view, fov_degrees));
+    }
+
+    /// The scene.
+    ///
+    /// # Errors
+    /// Insufficient memory, more vertices than 32 bits can count, or a camera that looks at its own position.
+    pub fn build(self) -> Result<LoadedScene, LoadError> {
+        let Self { builder, options, lights, environment, view } = self;
+        let name = Path::new("scene");
+        let sky = |radiance| EnvironmentChange { radiance, map: None, to_map: Mat3::IDENTITY };
+        let mut loaded = builder.build(name, &options, environment.map(sky))?;
+        loaded.files.clear();
+        let point = |user: glam::Vec3| loaded.transform.point(DVec3::from(user.as_dvec3()).to_array());
+        let factor = loaded.transform.intensity_factor() as f32;
+        let placed = |light: PointLight| match light {
+            PointLight::Point { position, intensity } => {
+                PointLight::Point { position: point(position), intensity: factor * intensity }
+            }
+            PointLight::Spot { position, direction, intensity, cos_inner, cos_outer } => PointLight::Spot {
+                position: point(position),
+                direction,
+                intensity: factor * intensity,
+                cos_inner,
+                cos_outer,
+            },
+            directional => directional,
+        };
+        loaded.lights = lights.into_iter().map(placed).collect();
+        if let Some((view, fov_degrees)) = view {
+            let camera = loaded.camera_at(view, fov_degrees).ok_or_else(|| {
+                LoadError::of_file(name, "`eye` and `look_at` are the same point", "move one of them")
+            })?;
+            loaded.camera = Some(loaded.with_start(camera, view));
+            loaded.view = Some(view);
+        }
+        Ok(loaded)
+    }
+}

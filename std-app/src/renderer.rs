@@ -1,0 +1,131 @@
+//! Renderer of a loaded scene: one build for many views.
+
+use crate::load::{self, LoadError, LoadOptions, LoadedScene, SceneViews, View};
+use crate::render::{Built, BuiltMemory, Pool, Progress, RenderError, RenderResult, Request, Settings};
+use core::sync::atomic::AtomicBool;
+use halflight_core::Level;
+pub use halflight_core::scene::Camera;
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A loaded scene with its hierarchy, its lights and its threads. Renders of several views share them, also at
+/// the same time from several threads.
+///
+/// ```no_run
+/// use halflight::Renderer;
+/// use halflight::render::{Settings, Stop};
+///
+/// let renderer = Renderer::open("scenes/cornell/cornell.obj")?;
+/// let stop = Stop { error: Some(1e-3), ..Stop::default() };
+/// let picture = renderer.render(&Settings { stop, ..Settings::default() })?;
+/// halflight::save::write("cornell.png".as_ref(), &picture.image)?;
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+pub struct Renderer {
+    scene: BuiltScene,
+    /// Pools by their number of threads.
+    pools: Mutex<HashMap<Option<usize>, Arc<Pool>>>,
+}
+
+/// Owner of what [`View`]s borrow.
+struct Owner {
+    loaded: LoadedScene,
+    memory: BuiltMemory,
+}
+
+/// Structures and texture views of an owned scene.
+struct OfScene<'a> {
+    views: SceneViews<'a>,
+    built: Built<'a>,
+}
+
+self_cell::self_cell!(
+    struct BuiltScene {
+        owner: Owner,
+        #[covariant]
+        dependent: OfScene,
+    }
+);
+
+impl Renderer {
+    /// Loads `path`, a scene file or a mesh, and builds its structures.
+    ///
+    /// # Errors
+    /// Those of [`load::load`] and [`Renderer::new`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Box<dyn core::error::Error + Send + Sync>> {
+        let load =
+            |path: &Path| -> Result<LoadedScene, LoadError> { load::load(path, &LoadOptions::default()) };
+        Ok(Self::new(load(path.as_ref())?, None)?)
+    }
+
+    /// Builds the structures of `loaded` within `memory` bytes; `None`: no limit.
+    ///
+    /// # Errors
+    /// Insufficient memory, or no threads.
+    pub fn new(loaded: LoadedScene, memory: Option<usize>) -> Result<Self, RenderError> {
+        let pool = Arc::new(Pool::new(None)?);
+        let owner = Owner { loaded, memory: BuiltMemory::default() };
+        let scene = BuiltScene::try_new(owner, |owner| {
+            let views = owner.loaded.views();
+            let scene = views.scene(owner.loaded.camera_or_default());
+            let built = Built::new(&scene, (Level::detect(), memory), &pool, &owner.memory)?;
+            Ok::<_, RenderError>(OfScene { views, built })
+        })?;
+        Ok(Self { scene, pools: Mutex::new(HashMap::from([(None, pool)])) })
+    }
+
+    /// The loaded scene, with its notes.
+    pub fn scene(&self) -> &LoadedScene {
+        &self.scene.borrow_owner().loaded
+    }
+
+    /// Seconds of building.
+    pub fn build_seconds(&self) -> f64 {
+        self.scene.borrow_dependent().built.seconds()
+    }
+
+    /// A pinhole camera at `view`, in the coordinates of the files; `None` if both of its points are equal.
+    pub fn camera(&self, view: View, fov_degrees: f64) -> Option<Camera> {
+        let camera = self.scene().camera_at(view, fov_degrees)?;
+        Some(self.scene().with_start(camera, view))
+    }
+
+    /// Renders the view of the scene file, or one that frames the scene.
+    ///
+    /// # Errors
+    /// Those of [`crate::render::render`].
+    pub fn render(&self, settings: &Settings) -> Result<RenderResult, RenderError> {
+        let camera = self.scene().camera_or_default();
+        self.render_with(camera, settings, &mut |_| {}, &AtomicBool::new(false))
+    }
+
+    /// Renders the view of `camera` until a rule of `settings.stop` holds or `interrupt` is raised, from any
+    /// thread. The calling thread calls `progress` after each round, outside the measured time.
+    ///
+    /// # Errors
+    /// Those of [`crate::render::render`].
+    pub fn render_with(
+        &self,
+        camera: Camera,
+        settings: &Settings,
+        progress: &mut dyn FnMut(&Progress),
+        interrupt: &AtomicBool,
+    ) -> Result<RenderResult, RenderError> {
+        let OfScene { views, built } = self.scene.borrow_dependent();
+        let scene = views.scene(camera);
+        let pool = self.pool(settings.threads)?;
+        Request::open(&scene, settings)?.render(built, &pool, progress, interrupt)
+    }
+
+    /// The pool of so many threads.
+    fn pool(&self, threads: Option<usize>) -> Result<Arc<Pool>, RenderError> {
+        let mut pools = self.pools.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pool) = pools.get(&threads) {
+            return Ok(pool.clone());
+        }
+        let pool = Arc::new(Pool::new(threads)?);
+        pools.insert(threads, pool.clone());
+        Ok(pool)
+    }
+}
