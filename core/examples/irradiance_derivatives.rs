@@ -2,10 +2,9 @@
 //! a point have found (Schwarzhaupt, Jensen, Jarosz 2012, occlusion-aware), and the eigen decomposition that
 //! bounds a record.
 use halflight_core::Level;
-use halflight_core::cache::irradiance::{CellFlux, Hemisphere, Metric, metric, validity};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
-use halflight_core::sampling::warp::cosine_hemisphere;
-use halflight_simd::kernels::eigen::symmetric2;
+use halflight_core::parts::eigen::symmetric2;
+use halflight_core::parts::irradiance::{CellFlux, Hemisphere, Metric, cosine_hemisphere, metric, validity};
 
 /// Strata along a side of the hemisphere.
 const N: usize = 16;

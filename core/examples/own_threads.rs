@@ -2,11 +2,11 @@
 #[path = "room/mod.rs"]
 mod room;
 
-use halflight_core::bvh::Serial;
 use halflight_core::memory::OutOfMemory;
-use halflight_core::method::{Passed, Worker};
-use halflight_core::transport::Counters;
-use halflight_core::{Arena, Executor, Line, RenderError, Renderer, Settings, Until};
+use halflight_core::parts::rays::Serial;
+use halflight_core::{
+    Arena, Counters, Executor, Line, Passed, RenderError, Renderer, Settings, Until, Worker,
+};
 use std::sync::Mutex;
 
 /// Threads with working memory for each.

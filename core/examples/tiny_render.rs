@@ -4,11 +4,10 @@
 #[path = "room/mod.rs"]
 mod room;
 
-use halflight_core::method::{
-    BidirectionalSettings, CacheOptions, LobeSettings, PathOptions, PhotonSettings,
+use halflight_core::{
+    Arena, BidirectionalSettings, CacheOptions, Level, Line, LobeSettings, Loop, Method, MetropolisSettings,
+    PathOptions, PhotonSettings, RenderError, Renderer, Rgb, Settings, Until, VirtualLightSettings,
 };
-use halflight_core::method::{MetropolisSettings, VirtualLightSettings};
-use halflight_core::{Arena, Level, Line, Loop, Method, RenderError, Renderer, Rgb, Settings, Until};
 
 /// Pixels across and down.
 pub const SIZE: usize = 32;

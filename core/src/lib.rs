@@ -15,9 +15,8 @@
 //!
 //! ```
 //! use halflight_core::glam::Vec3;
-//! use halflight_core::method::PathOptions;
 //! use halflight_core::scene::{Camera, Material, Mesh, Triangle};
-//! use halflight_core::{Arena, Line, Loop, Method, Renderer, Rgb, Scene, Settings, Until};
+//! use halflight_core::{Arena, Line, Loop, Method, PathOptions, Renderer, Rgb, Scene, Settings, Until};
 //!
 //! // A lamp above a floor.
 //! let positions = [
@@ -30,10 +29,8 @@
 //! let scene = Scene {
 //!     mesh: Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() },
 //!     materials: &materials,
-//!     textures: &[],
-//!     lights: &[],
-//!     environment: None,
 //!     camera: Camera::look_at(Vec3::new(0.0, 2.0, 6.0), Vec3::ZERO, Vec3::Y, 40.0),
+//!     ..Scene::default()
 //! };
 //!
 //! let settings = Settings::new([32, 24]).with_method(Method::Path(PathOptions::default()));
@@ -58,53 +55,66 @@
 //!
 //! # Parts
 //!
-//! Parts can be used alone: rays against a mesh ([`bvh::Bvh`]), nearest photons ([`photon::PhotonMap`]),
-//! scattering ([`bsdf::Bsdf`]), records and derivatives of irradiance ([`cache`]). Each has an example.
+//! [`parts`] can be used alone: rays against a mesh, nearest photons, irradiance at points, eigen
+//! decomposition, scattering.
 //!
-//! # Layers
+//! # Promise
 //!
-//! The modules are layers: each imports only those above it in this list, which `cargo verify source`
-//! enforces.
-//!
-//! - [`findings`]: decisions and numbers of a method, for reports.
-//! - [`memory`], [`geometry`], [`sampling`]: arenas, vectors and rays, random numbers and their warps.
-//! - [`scene`]: borrowed views of the meshes, materials, textures, lights and the camera to render.
-//! - [`bsdf`]: scattering at a point. [`bvh`]: ray tracing. [`light`]: sampling of all lights together.
-//! - [`film`]: pixels and tiles. [`photon`]: photon maps. [`cache`]: cached light with its derivatives.
-//! - [`estimate`]: the error of a picture. [`census`]: the kinds of things in a scene, and the code they
-//!   need.
-//! - [`transport`]: subpaths, path tracing, photon tracing, gathering. [`method`]: the methods of rendering.
-//! - [`renderer`]: the front of all methods.
+//! Everything on these pages is kept within a version 0.x: `cargo verify doors` compares it with the list in
+//! `core/doors.txt`. Modules that these pages do not show are layers for the program, the tests and fuzzing,
+//! and may change at any time; docs/architecture.md describes them.
 #![no_std]
 #![forbid(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
+pub mod findings;
+pub mod memory;
+pub mod parts;
+pub mod renderer;
+pub mod scene;
+
+// Layers for the program, the tests and fuzzing. They may change with any version.
+#[doc(hidden)]
 pub mod bsdf;
+#[doc(hidden)]
 pub mod bvh;
+#[doc(hidden)]
 pub mod cache;
+#[doc(hidden)]
 pub mod census;
+#[doc(hidden)]
 pub mod estimate;
 mod features;
+#[doc(hidden)]
 pub mod film;
-pub mod findings;
+#[doc(hidden)]
 pub mod geometry;
+#[doc(hidden)]
 pub mod light;
-pub mod memory;
+#[doc(hidden)]
 pub mod method;
+#[doc(hidden)]
 pub mod photon;
-pub mod renderer;
+#[doc(hidden)]
 pub mod sampling;
-pub mod scene;
+#[doc(hidden)]
 pub mod transport;
 
+pub use estimate::ErrorEstimate;
+pub use film::{Film, Pixel};
 pub use glam;
 pub use halflight_simd::{Level, Tier};
 pub use memory::{Arena, Line};
-pub use method::{Executor, Loop, Method};
+pub use method::choice::Goal;
+pub use method::{
+    BidirectionalSettings, CacheOptions, Executor, LobeSettings, Loop, Method, MethodKind,
+    MetropolisSettings, Passed, PathOptions, PhotonSettings, Shard, VirtualLightSettings, Worker,
+};
 pub use renderer::{RenderError, Renderer, RequiredMemory, Settings, Until};
 pub use scene::Scene;
+pub use transport::Counters;
 
 /// Linear sRGB triple: radiance in W/(m² sr), reflectance, throughput; one meaning per use.
 pub type Rgb = glam::Vec3;

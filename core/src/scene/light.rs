@@ -48,3 +48,10 @@ pub struct Environment {
     /// Rotation from world directions to those of the map.
     pub to_map: Mat3,
 }
+
+impl Environment {
+    /// The same `radiance` from all directions.
+    pub const fn uniform(radiance: Rgb) -> Self {
+        Self { radiance, map: None, to_map: Mat3::IDENTITY }
+    }
+}

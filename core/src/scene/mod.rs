@@ -37,3 +37,17 @@ pub struct Scene<'a> {
     /// Camera.
     pub camera: Camera,
 }
+
+impl Default for Scene<'_> {
+    /// Nothing in the dark, seen from (0, 0, 1).
+    fn default() -> Self {
+        Self {
+            mesh: Mesh::default(),
+            materials: &[],
+            textures: &[],
+            lights: &[],
+            environment: None,
+            camera: Camera::look_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 40.0),
+        }
+    }
+}

@@ -23,6 +23,7 @@ const LAYERS: &[&str] = &[
     "transport",
     "method",
     "renderer",
+    "parts",
 ];
 
 /// Folders and files of core/src/transport, lowest first: subpaths, wavefront, path tracer, and the methods

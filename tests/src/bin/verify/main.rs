@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod command;
+mod doors;
 mod fuzz;
 mod layers;
 mod limits;
@@ -62,6 +63,7 @@ const STEPS: &[Step] = &[
     step("fmt", "rustfmt leaves every workspace as it is", quality::fmt, When::Always),
     step("clippy", "no warning in any workspace", quality::clippy, When::Whole),
     step("test", "cargo test --profile quick --workspace", quality::test, When::Whole),
+    step("doors", "public names of the core are those of core/doors.txt", doors::check, When::Whole),
     step("docs", "rustdoc without a warning", quality::docs, When::Whole),
     step("targets", "the tiny render on every target: same bits", targets::check, When::Whole),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),

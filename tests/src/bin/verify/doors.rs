@@ -1,0 +1,106 @@
+//! Doors of the core: the public names that its documentation shows, against the list in `core/doors.txt`.
+
+use crate::command::{command, run};
+use crate::{Failure, Outcome, Project};
+use std::fs;
+use std::path::Path;
+
+/// Most items that the documentation may show, so that the front stays a front.
+const MOST_ITEMS: usize = 250;
+
+/// Most changed names in a message.
+const MOST_SHOWN: usize = 8;
+
+/// The list, and the variable that writes it anew.
+const LIST: &str = "core/doors.txt";
+const VARIABLE: &str = "SNAPSHOT";
+
+/// Kinds of names within an item.
+const KINDS: [&str; 5] = ["method", "tymethod", "variant", "structfield", "associatedconstant"];
+
+pub(crate) fn check(project: &Project) -> Outcome {
+    let line = "cargo rustdoc --profile quick --quiet --locked --package halflight-core --lib";
+    run(&mut command(&project.root, line))?;
+    let pages = project.root.join("target/doc/halflight_core");
+    let found = doors(&pages).map_err(|error| Failure::Failed(format!("{}: {error}", pages.display())))?;
+    let items = found.lines().filter(|line| !line.starts_with(' ')).count();
+    if items > MOST_ITEMS {
+        return Err(Failure::Failed(format!("the core shows {items} items, more than {MOST_ITEMS}")));
+    }
+    let list = project.root.join(LIST);
+    if std::env::var(VARIABLE).is_ok_and(|value| value == "write") {
+        fs::write(&list, &found).map_err(|error| Failure::Failed(format!("{LIST}: {error}")))?;
+    }
+    let promised = fs::read_to_string(&list).unwrap_or_default();
+    let gone: Vec<&str> = lost(&promised, &found);
+    let new: Vec<&str> = lost(&found, &promised);
+    match gone.is_empty() && new.is_empty() {
+        true => Ok(format!("{items} items, {} names", found.lines().count())),
+        false => Err(Failure::Failed(format!(
+            "the doors of the core have changed: gone {gone:?}, new {new:?}; a promised name must stay within a \
+             version, and {VARIABLE}=write records the others"
+        ))),
+    }
+}
+
+/// Lines of `one` that `other` lacks.
+fn lost<'t>(one: &'t str, other: &str) -> Vec<&'t str> {
+    let known: std::collections::HashSet<&str> = other.lines().collect();
+    one.lines().filter(|line| !known.contains(line)).take(MOST_SHOWN).collect()
+}
+
+/// Items of a crate's documentation, and the names in each, a line each.
+fn doors(pages: &Path) -> std::io::Result<String> {
+    let all = fs::read_to_string(pages.join("all.html"))?;
+    let main = all.split_once("<h3 id=").map_or("", |(_, main)| main);
+    let mut lines = Vec::new();
+    for link in main.split("<a href=\"").skip(1) {
+        let Some((file, rest)) = link.split_once("\">") else { continue };
+        let Some((name, _)) = rest.split_once("</a>") else { continue };
+        let kind = file.rsplit('/').next().and_then(|page| page.split('.').next()).unwrap_or_default();
+        lines.push(format!("{kind} {name}"));
+        let page = fs::read_to_string(pages.join(file))?;
+        lines.extend(names_in(&page).into_iter().map(|inner| format!("  {name} {inner}")));
+    }
+    lines.sort();
+    lines.dedup();
+    // Names stand below their item.
+    let name = |line: &String| {
+        line.trim_start().split(' ').nth(usize::from(!line.starts_with(' '))).map(str::to_owned)
+    };
+    lines.sort_by_key(name);
+    Ok(lines.join("\n") + "\n")
+}
+
+/// Names that an item declares itself, without those of the traits that it implements.
+fn names_in(page: &str) -> Vec<String> {
+    let ends = ["id=\"trait-implementations\"", "id=\"synthetic-implementations\"", "id=\"implementors\""];
+    let own = ends.iter().fold(page, |page, end| page.split_once(end).map_or(page, |(own, _)| own));
+    let ids = own.split(" id=\"").skip(1).filter_map(|rest| rest.split_once('"').map(|(id, _)| id));
+    let is_name = |id: &&str| id.split_once('.').is_some_and(|(kind, _)| KINDS.contains(&kind));
+    let mut names: Vec<String> = ids.filter(is_name).map(str::to_owned).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_an_item_end_before_the_traits_that_it_implements() {
+        let page = "<section id=\"method.new\"><a id=\"variant.Size\"><h2 id=\"trait-implementations\">\
+                    <section id=\"method.clone\">";
+        assert_eq!(
+            names_in(&page.replace("<a id", "<a x id").replace("<section id", "<section x id")),
+            ["method.new", "variant.Size"]
+        );
+    }
+
+    #[test]
+    fn a_lost_name_is_found() {
+        assert_eq!(lost("struct A\n  A method.new\n", "struct A\n"), ["  A method.new"]);
+        assert!(lost("struct A\n", "struct A\nstruct B\n").is_empty());
+    }
+}
