@@ -20,15 +20,18 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod cgroup;
 pub mod compare;
 mod file_error;
 pub mod load;
 pub mod memory;
 pub mod pages;
 pub mod picture;
+pub mod pool;
 pub mod render;
 mod renderer;
 pub mod report;
 pub mod save;
+pub mod values;
 
 pub use renderer::{Camera, Renderer};

@@ -64,7 +64,7 @@ impl Renderer {
     /// # Errors
     /// Insufficient memory, or no threads.
     pub fn new(loaded: LoadedScene, memory: Option<usize>) -> Result<Self, RenderError> {
-        let pool = Arc::new(Pool::new(None)?);
+        let pool = Arc::new(Pool::start(None)?);
         let owner = Owner { loaded, memory: BuiltMemory::default() };
         let scene = BuiltScene::try_new(owner, |owner| {
             let views = owner.loaded.views();
@@ -124,7 +124,7 @@ impl Renderer {
         if let Some(pool) = pools.get(&threads) {
             return Ok(pool.clone());
         }
-        let pool = Arc::new(Pool::new(threads)?);
+        let pool = Arc::new(Pool::start(threads)?);
         pools.insert(threads, pool.clone());
         Ok(pool)
     }

@@ -43,7 +43,11 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("render scene.obj --size 0x5", "640x480"),
         ("render scene.obj --eye 1,2", "three numbers"),
         ("render scene.obj --time soon", "30s, 2m or 1h"),
-        ("render scene.obj --spp 0", "0 is not in"),
+        ("render scene.obj --spp 0", "from 1 to 2^30"),
+        ("render scene.obj --max-depth 0", "at least 1 segment"),
+        ("render scene.obj --error nan", "1e-15 to 1e30"),
+        ("render scene.obj --fov 178", "less than 178 degrees"),
+        ("render scene.obj --lens 1e9,1", "more than 1000 times"),
         ("render scene.obj --simd mmx", "baseline, avx2, avx512"),
         ("render scene.obj --sparkle", "unexpected argument"),
         ("render scene.obj --eye 1,1,1 --look-at 1,1,1", "--eye and --look-at are the same point"),
@@ -131,6 +135,20 @@ fn a_render_without_a_stop_rule_ends_by_its_error_and_says_so() {
     assert_eq!(folder.object("render scene.obj --size 16x16 --spp 4 --json")["stop_rule"], "spp");
     let object = folder.object("render scene.obj --size 64x64 --time 0.2s --json");
     assert_eq!(object["stop_rule"], "time");
+}
+
+#[test]
+fn a_scene_without_light_is_black_at_once_and_says_so() {
+    let folder = Folder::new("dark");
+    std::fs::write(folder.path("scene.mtl"), "newmtl floor\nKd 0.5 0.5 0.5\n").unwrap();
+    for (rules, spp) in [("", 1), ("--time 1h", 1), ("--error 1e-9", 1), ("--spp 3", 3)] {
+        let output = folder.run(&format!("render scene.obj -o a.pfm --size 8x8 {rules} --json"));
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.contains("note: nothing in this scene emits light"), "{said}");
+        let object: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!((output.status.code(), &object["spp"]), (Some(0), &spp.into()), "{rules}");
+    }
+    assert_eq!(read(&folder.path("a.pfm")).unwrap(), Image::black(8, 8));
 }
 
 #[test]
@@ -238,6 +256,9 @@ fn a_reference_is_compared_with_and_its_size_is_checked_first() {
     assert_eq!((&last["spp"], &last["relmse"]), (&object["spp"], &object["error"]["estimate"]["relmse"]));
     assert_eq!(last["reference"]["mse"], object["error"]["mse"]);
     assert!(history[0]["reference"]["flip"].is_number());
+    write(&folder.path("nan.pfm"), &Image { width: 8, height: 8, pixels: vec![[f32::NAN; 3]; 64] }).unwrap();
+    let render = "render scene.obj -o a.exr --size 8x8 --spp 4 --reference nan.pfm --report out --json";
+    assert!(folder.object(render)["error"]["relmse"].is_null(), "there is nothing to compare with");
     let said = folder.refused("render scene.obj -o b.exr --size 9x9 --reference r.exr");
     assert!(said.contains("--size 16x16") && !folder.path("b.exr").exists(), "{said}");
 }
@@ -266,6 +287,14 @@ fn compare_prints_known_values() {
     write(&folder.path("nan.pfm"), &flat(f32::NAN)).unwrap();
     let text = String::from_utf8(folder.run("compare nan.pfm b.pfm").stdout).unwrap();
     assert!(text.contains("2 pixels of the picture are infinite or not a number"), "{text}");
+    assert!(text.contains("relMSE NaN"), "{text}");
+    for pair in ["nan.pfm b.pfm", "b.pfm nan.pfm", "nan.pfm nan.pfm"] {
+        let object = folder.object(&format!("compare {pair} --json"));
+        assert!(
+            ["relmse", "mse", "rmse", "flip", "mean"].iter().all(|key| object[key].is_null()),
+            "{object}"
+        );
+    }
 }
 
 #[test]

@@ -9,11 +9,14 @@ mod fair_schedule;
 mod loading;
 #[cfg(target_os = "linux")]
 mod memory;
+mod names;
 mod outputs;
 mod parts;
 mod picture_files;
 mod pictures;
 #[cfg(unix)]
 mod pipes;
+#[cfg(target_os = "linux")]
+mod process;
 mod renderer;
 mod support;

@@ -21,6 +21,7 @@ mod values;
 use clap::{Parser, Subcommand};
 use failure::Failure;
 use halflight::memory::Budget;
+use halflight::pool::in_pool;
 use halflight::save::{self, Image};
 use std::io::{Write, stdout};
 use std::panic;
@@ -45,22 +46,42 @@ enum Command {
     Info(info::Info),
 }
 
+impl Command {
+    /// Number of threads; `None`: all of the machine.
+    fn threads(&self) -> Option<usize> {
+        match self {
+            Command::Render(command) => command.threads(),
+            Command::Race(command) => command.threads(),
+            _ => None,
+        }
+    }
+
+    fn run(&self) -> Result<ExitCode, Failure> {
+        match self {
+            Command::Render(command) => command.run(),
+            Command::Compare(command) => command.run(),
+            Command::Merge(command) => command.run(),
+            Command::Race(command) => command.run(),
+            Command::Info(command) => command.run(),
+        }
+    }
+}
+
 /// Runs the program. Exit codes are a contract (docs/cli.md).
 fn main() -> ExitCode {
-    interrupt::block_file_size_signal();
+    interrupt::block_signals();
     panic::set_hook(Box::new(|panic| print_message(format_args!("internal error of halflight: {panic}"))));
     let command = match Cli::try_parse() {
         Ok(cli) => cli.command,
         Err(message) => return end_with(&message),
     };
-    let outcome = panic::catch_unwind(panic::AssertUnwindSafe(|| match command {
-        Command::Render(command) => command.run(),
-        Command::Compare(command) => command.run(),
-        Command::Merge(command) => command.run(),
-        Command::Race(command) => command.run(),
-        Command::Info(command) => command.run(),
-    }));
-    match outcome {
+    let run = || {
+        in_pool(command.threads(), || command.run()).unwrap_or_else(|error| {
+            Err(Failure::new(format!("no thread could be started: {error}"))
+                .advice("raise the limit of processes: ulimit -u, or that of the control group"))
+        })
+    };
+    match panic::catch_unwind(panic::AssertUnwindSafe(run)) {
         Ok(Ok(code)) => return code,
         Ok(Err(failure)) => print_message(failure),
         Err(_) => print_message("  help: please report it, with the command and the scene"),
@@ -76,14 +97,17 @@ fn read_picture(path: &Path, budget: &mut Budget) -> Result<Image, Failure> {
     Ok(image)
 }
 
-/// Prints help, version or wrong usage, which clap reports alike.
+/// Prints help, version or wrong usage, which clap reports alike. Usage repeats arguments: it has no colours.
 fn end_with(message: &clap::Error) -> ExitCode {
-    let is_usage = message.use_stderr();
-    let printed = message.print().and_then(|()| stdout().flush());
-    match check_output(printed).err().filter(|_| !is_usage) {
-        Some(failure) => print_message(failure),
-        None if !is_usage => return ExitCode::SUCCESS,
-        None => {}
+    if message.use_stderr() {
+        print_message(message.to_string().trim_end());
+        return ExitCode::from(2);
     }
-    ExitCode::from(2)
+    match check_output(message.print().and_then(|()| stdout().flush())) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            print_message(failure);
+            ExitCode::from(2)
+        }
+    }
 }

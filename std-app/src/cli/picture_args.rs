@@ -3,7 +3,7 @@
 
 use super::camera_args::CameraArgs;
 use super::failure::Failure;
-use super::{read_picture, values};
+use super::{print_note, read_picture, values};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use halflight::load::{LoadOptions, LoadedScene};
@@ -14,9 +14,11 @@ use halflight::render::{
 };
 use halflight::report::quantity::readable_bytes;
 use halflight::save::Image;
+use halflight::values::Depth;
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::cache::radiance::Basis;
 use halflight_core::photon;
+use halflight_core::scene::Scene;
 use halflight_simd::{Level, Tier};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -42,6 +44,11 @@ pub(super) struct PictureArgs {
 }
 
 impl PictureArgs {
+    /// Number of threads; `None`: all of the machine.
+    pub(super) fn threads(&self) -> Option<usize> {
+        self.threads.map(|threads| threads as usize)
+    }
+
     /// File of the reference picture.
     pub(super) fn reference_file(&self) -> Option<&Path> {
         self.reference.as_deref()
@@ -71,17 +78,17 @@ impl PictureArgs {
         reference: Option<Arc<Image>>,
     ) -> Result<Settings, Failure> {
         let (file, defaults) = (&loaded.settings, Settings::default());
-        let [width, height] = self.size.or(file.size).unwrap_or([defaults.width, defaults.height]);
+        let [width, height] =
+            self.size.or(file.size.map(<[u32; 2]>::from)).unwrap_or([defaults.width, defaults.height]);
         self.check_reference(reference.as_deref(), [width, height])?;
         args.check_degree()?;
-        let of_file = || MethodArg::from_str(file.method.as_deref()?, true).ok()?.0;
         Ok(args.apply(Settings {
-            method: method.0.or_else(of_file),
+            method: method.0.or(file.method.and_then(|method| method.0)),
             width,
             height,
             seed: file.seed.unwrap_or(defaults.seed),
-            max_depth: file.max_depth,
-            threads: self.threads.map(|threads| threads as usize),
+            max_depth: file.max_depth.map(u32::from),
+            threads: self.threads(),
             memory: self.memory,
             stop,
             reference,
@@ -152,9 +159,9 @@ pub(super) struct MethodArgs {
     #[arg(long, value_name = "WHEN", help_heading = "Light transport")]
     windows: Option<When>,
     /// Longest path in segments: 1 is emission seen directly, 2 adds direct light [default: no limit]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..),
+    #[arg(long, value_name = "N", value_parser = values::checked::<u32, Depth>,
         help_heading = "Light transport")]
-    max_depth: Option<u32>,
+    max_depth: Option<Depth>,
     /// Share of the work for path tracing some pixels to measure the bias [default: 5% if the method is
     /// biased]
     #[arg(long, value_name = "SHARE|off", value_parser = values::audit, help_heading = "Light transport")]
@@ -307,7 +314,7 @@ impl MethodArgs {
         let level = if self.precise { Level::BASELINE } else { Level::detect() };
         Settings {
             seed: self.seed.unwrap_or(settings.seed),
-            max_depth: self.max_depth.or(settings.max_depth),
+            max_depth: self.max_depth.map(u32::from).or(settings.max_depth),
             reuse: When::forced(self.reuse),
             caustics: !matches!(self.caustics, Some(Caustics::Off)),
             environment_visibility: When::forced(self.windows),
@@ -346,6 +353,15 @@ impl MethodArgs {
 /// File name of a scene.
 pub(super) fn file_name(scene: &Path) -> String {
     scene.file_name().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Notes that a scene is dark; returns whether it is. More samples of its black picture show nothing.
+pub(super) fn note_darkness(scene: &Scene) -> bool {
+    let is_dark = scene.is_dark();
+    if is_dark {
+        print_note("nothing in this scene emits light: the picture is black. Add a light or an environment");
+    }
+    is_dark
 }
 
 /// Failure of a render of `scene`, with advice.

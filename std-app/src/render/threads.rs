@@ -3,25 +3,45 @@
 
 use super::RenderError;
 use super::deadline::{Deadline, End};
+use crate::pool;
 use halflight_core::Level;
 use halflight_core::bvh::{Bvh, ForkJoin};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::method::{Executor, Passed, RenderState, Round, Worker};
 use halflight_core::scene::Mesh;
 use halflight_core::transport::Counters;
+use rayon::ThreadPool;
 use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// A pool of threads.
-pub(crate) struct Pool(ThreadPool);
+/// A pool of threads; `None`: that of the calling thread.
+pub(crate) struct Pool(Option<ThreadPool>);
 
 impl Pool {
-    /// A pool of `threads` threads; `None`: all of the machine.
+    /// The pool of this thread if it has at most `threads` threads, otherwise a new one; `None`: all of the
+    /// machine.
     pub(crate) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
-        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-        pool.map(Self).map_err(|error| RenderError::Threads(error.to_string()))
+        let is_here = rayon::current_thread_index().is_some()
+            && threads.is_none_or(|most| rayon::current_num_threads() <= most);
+        if is_here { Ok(Self(None)) } else { Self::start(threads) }
+    }
+
+    /// A new pool, which any thread may use.
+    pub(crate) fn start(threads: Option<usize>) -> Result<Self, RenderError> {
+        let pool = pool::start(threads).map_err(|error| RenderError::Threads(error.to_string()))?;
+        Ok(Self(Some(pool)))
+    }
+
+    fn count(&self) -> usize {
+        self.0.as_ref().map_or_else(rayon::current_num_threads, ThreadPool::current_num_threads)
+    }
+
+    fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        match &self.0 {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
     }
 
     /// Builds the BVH of `mesh` on all threads.
@@ -31,13 +51,16 @@ impl Pool {
         level: Level,
         arena: &mut Arena<'m>,
     ) -> Result<Bvh<'m>, OutOfMemory> {
-        self.0.install(|| Bvh::build_with(mesh, arena, level, self))
+        self.install(|| Bvh::build_with(mesh, arena, level, self))
     }
 }
 
 impl ForkJoin for Pool {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
-        self.0.join(a, b);
+        match &self.0 {
+            Some(pool) => pool.join(a, b),
+            None => rayon::join(a, b),
+        };
     }
 }
 
@@ -79,12 +102,12 @@ impl<'w> Workers<'w> {
 
     /// Number of threads.
     pub(super) fn count(&self) -> usize {
-        self.pool.0.current_num_threads()
+        self.pool.count()
     }
 
     /// Runs `work` on the pool, whose threads take the parts of its parallel iterators.
     pub(super) fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
-        self.pool.0.install(work)
+        self.pool.install(work)
     }
 
     /// Runs `work` once on every thread, each with its own working memory. The parallel iterator is compiled

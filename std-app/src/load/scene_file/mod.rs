@@ -11,7 +11,7 @@ pub use light::{EnvironmentEntry, LightEntry, LightKind};
 pub(super) use material::MaterialChange;
 pub use material::{MaterialEntry, MaterialKind};
 pub(super) use values::BRIGHTEST;
-pub use values::{Colour, Degrees, Factors, FieldOfView, Matrix, NotNegative, Number, Positive, Rotation};
+pub use values::{Colour, Factors, Matrix, Reflectance, Rotation};
 
 use super::error::LoadError;
 use super::files::{Found, Lookup};
@@ -20,10 +20,10 @@ use super::map::Map;
 use super::notes::Notes;
 use super::scene::{LoadedScene, RenderSettings, View};
 use super::{LoadOptions, SceneBuilder, memory_estimate, read, too_large};
+use crate::values::{FieldOfView, NotNegative, Number, Positive};
 use core::cell::RefCell;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
-use halflight_core::scene::Camera;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -106,6 +106,8 @@ pub fn parse(text: &str, file: &Path) -> Result<SceneFile, LoadError> {
 /// Text of a scene file, for errors with line and column, and the files that it names.
 struct Source<'a> {
     text: &'a str,
+    /// Byte at which each line starts.
+    lines: Vec<usize>,
     file: &'a Path,
     lookup: RefCell<Lookup>,
     notes: RefCell<Notes>,
@@ -114,14 +116,20 @@ struct Source<'a> {
 impl<'a> Source<'a> {
     fn new(text: &'a str, file: &'a Path) -> Self {
         let notes = Notes::of(file.display().to_string());
-        Self { text, file, lookup: RefCell::default(), notes: notes.into() }
+        let lines = [0].into_iter().chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Self { text, lines, file, lookup: RefCell::default(), notes: notes.into() }
     }
 
     fn error(&self, span: Range<usize>, problem: impl Into<String>, help: impl Into<String>) -> LoadError {
-        let before = self.text.get(..span.start).unwrap_or(self.text);
-        let line = before.matches('\n').count() as u32 + 1;
-        let column = before.rsplit('\n').next().unwrap_or_default().chars().count() as u32 + 1;
-        LoadError { column, ..LoadError::at(self.file, line, problem, help) }
+        let line = self.line(&span);
+        let before = self.text.get(self.lines[line - 1]..span.start).unwrap_or_default();
+        let column = before.chars().count() as u32 + 1;
+        LoadError { column, ..LoadError::at(self.file, line as u32, problem, help) }
+    }
+
+    /// Line of an entry, from 1.
+    fn line(&self, span: &Range<usize>) -> usize {
+        self.lines.partition_point(|start| *start <= span.start).max(1)
     }
 
     /// The file at a path of the scene file.
@@ -131,8 +139,9 @@ impl<'a> Source<'a> {
         let found = self.lookup.borrow_mut().locate(&[name.as_bytes()], &[directory]);
         let note = found.note("file", name.as_bytes());
         if let Some(file) = found.file() {
-            let line = self.error(path.span(), "", "").line;
-            note.into_iter().for_each(|note| self.notes.borrow_mut().at(line, note));
+            if let Some(note) = note {
+                self.notes.borrow_mut().at(self.line(&path.span()) as u32, note);
+            }
             return Ok(file.into());
         }
         let problem = match found {
@@ -229,10 +238,16 @@ fn place_camera(
     let pinhole = loaded.camera_at(view, fov).ok_or_else(|| {
         source.error(entry.span(), "`eye` and `look_at` are the same point", "move one of them")
     })?;
-    let length = |user: f64| loaded.transform.length(user) as f32;
-    let focus = camera.focus_distance.map_or(pinhole.focus_distance, |focus| length(focus.into()));
-    let lens_radius = length(f64::from(camera.lens_radius));
-    let camera = Camera { lens_radius, focus_distance: focus, ..pinhole };
+    if camera.up.is_some() && view.looks_along_up() {
+        let problem = "the camera looks along its `up`";
+        return Err(source.error(entry.span(), problem, "give another direction that is up in the picture"));
+    }
+    let camera = loaded
+        .with_lens(pinhole, camera.lens_radius.into(), camera.focus_distance.map(f64::from))
+        .ok_or_else(|| {
+        let problem = "`lens_radius` is more than 1000 times the distance in focus";
+        source.error(entry.span(), problem, "both are lengths in the units of the meshes")
+    })?;
     loaded.camera = Some(loaded.with_start(camera, view));
     loaded.view = Some(view);
     Ok(())
