@@ -165,7 +165,7 @@ fn textures_are_found_whatever_their_path_is_like() {
         (b"map_Kd maps\\stone.BMP", 70, true),
         (b"map_Kd C:/x/Maps/Stone.bmp -s 3 3", 70, true),
         (b"norm end ", 80, false),
-        (b"bump -bm 1 -gamma 2.2 t.bmp", 10, true),
+        (b"map_Ke -bm 1 -gamma 2.2 t.bmp", 10, true),
     ];
     for (statement, red, said) in cases {
         let shown = String::from_utf8_lossy(statement);

@@ -32,7 +32,7 @@ mod texture_set;
 mod transform;
 
 pub use error::LoadError;
-pub use map::{Map, MapOptions};
+pub use map::{Channel, Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
 pub use scene::{LoadedScene, RenderSettings, SceneViews, View};
@@ -258,11 +258,15 @@ impl SceneBuilder {
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
         let materials: Vec<Material> =
             self.materials.iter().map(|mtl| surface::resolve(mtl, &mut textures, notes)).collect();
+        notes.merge(core::mem::take(&mut textures.notes));
         let environment = environment.map(|entry| Environment {
             radiance: entry.radiance,
             map: textures.colour(entry.map.as_ref()),
             to_map: entry.to_map,
         });
+
+        let derived = textures.derived_bytes();
+        self.budget.take(derived).map_err(|why| too_large(path, &why))?;
 
         let mut parts = Vec::new();
         for mesh in &self.meshes {
