@@ -164,11 +164,12 @@ fn a_lamp_that_is_there_twice_shines_once() {
         let scene = of(faces);
         assert!(scene.repairs.is_empty(), "{faces}: {:?}", scene.repairs);
     }
-    for faces in ["usemtl a\nf 1 2 3 4\nf 2 3 4 1\n", "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n"] {
-        let scene = of(faces);
-        assert!(scene.triangles.len() > 1);
-        says(&scene, &["in the same place"]);
-    }
+    let other = of("usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n");
+    assert_eq!(other.triangles.len(), 1);
+    says(&other, &["lamp `b`", "twice"]);
+    let partly = of("usemtl a\nf 1 2 3\nf 2 3 4\n");
+    assert_eq!(partly.triangles.len(), 2);
+    says(&partly, &["`a` and `a`", "both emit"]);
 }
 
 #[test]

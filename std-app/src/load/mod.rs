@@ -20,6 +20,7 @@ mod name;
 mod notes;
 pub mod obj;
 mod open_glass;
+mod overlaps;
 mod relief;
 mod scene;
 pub mod scene_file;
@@ -29,6 +30,7 @@ mod texcoords;
 mod text;
 mod texture;
 mod texture_set;
+mod touching_glass;
 mod transform;
 
 pub use error::LoadError;
@@ -256,7 +258,7 @@ impl SceneBuilder {
             Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
         };
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
-        let materials: Vec<Material> =
+        let mut materials: Vec<Material> =
             self.materials.iter().map(|mtl| surface::resolve(mtl, &mut textures, notes)).collect();
         notes.merge(core::mem::take(&mut textures.notes));
         let environment = environment.map(|entry| Environment {
@@ -284,14 +286,20 @@ impl SceneBuilder {
         self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
         let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
-        let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
-        duplicate_emitters::remove(&mut geometry, &materials, &names, notes);
+        let mut names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
+        let mut overlaps = overlaps::locate(&geometry, &materials);
+        if duplicate_emitters::remove(&mut geometry, &overlaps, &materials, &names, notes) {
+            overlaps = overlaps::locate(&geometry, &materials);
+        }
+        overlaps::note(&overlaps, &geometry.triangles, &materials, &names, notes);
+        touching_glass::relate(&mut geometry, &overlaps, &mut materials, &mut names, notes);
         open_glass::note(&geometry, &materials, &names, notes);
         Ok(LoadedScene {
             positions: geometry.positions,
             normals: geometry.normals,
             texcoords: geometry.texcoords,
             triangles: geometry.triangles,
+            overlaps: overlaps::both_orders(&overlaps),
             materials,
             material_names: names,
             textures,
