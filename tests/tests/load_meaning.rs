@@ -220,16 +220,17 @@ fn ks_of_phong_files_leaves_the_base_its_weight() {
     assert_eq!(coat("Kd .8 .8 .8\nKs .5 .5 .5\nNs 250\nNi 1.45\nillum 2"), (0.8, level(0.5)));
     assert_eq!(coat("Kd 1 1 1\nmap_Kd o.bmp\nmap_Ks h.bmp"), (1.0, level(1.0)));
     assert_eq!(coat("Kd 1 1 1\nmap_Kd o.bmp\nmap_Ks o.bmp"), (1.0, 1.0));
-    says(&material("Kd 1 1 1\nKs .9 .9 .9\nNs 10"), &["`Kd` and `Ks`", "`a`", "1.9", "0.08"]);
+    says(&material("Kd 1 1 1\nKs .9 .9 .9\nNs 10\nillum 2"), &["`Kd` and `Ks`", "`a`", "1.9", "0.08"]);
     assert_eq!(coat("Kd 1 1 1\nKs .04 .04 .04\nNi 1.5\nillum 2").1, 0.04);
     assert_eq!(coat("Kd 1 1 1\nKs .17 .17 .17\nNi 2.4\nillum 2").1, 0.17);
-    assert_eq!(coat("Kd 1 1 1\nKs .05 .05 .05\nNs 10").1, 0.05);
+    assert_eq!(coat("Kd 1 1 1\nKs .05 .05 .05\nNs 10\nillum 2").1, 0.05);
     for same in [
-        "Kd .1 .1 .1\nKs .9 .9 .9\nNs 10",
-        "Kd 0 0 0\nKs .9 .9 .9\nNs 10",
+        "Kd .1 .1 .1\nKs .9 .9 .9\nNs 10\nillum 2",
+        "Kd 0 0 0\nKs .9 .9 .9\nNs 10\nillum 2",
         "Kd .5 .5 .5\nKs .9 .9 .9\nPr .5",
         "Kd .5 .5 .5\nKs .9 .9 .9\nPm 0",
-        "Kd .75 .61 .23\nKs .9 .55 .37\nNs 51",
+        "Kd .75 .61 .23\nKs .9 .55 .37\nNs 51\nillum 2",
+        "Kd .5 .5 .5\nKs .9 .9 .9\nNs 32",
         "Kd .5 .5 .5\nKs .9 .9 .9\nillum 3",
     ] {
         assert_eq!(coat(same).1, 0.9, "{same}");

@@ -2,8 +2,8 @@
 //! backslashes, in another case or encoding. The exact name is tried first, then each tail of the path from
 //! the longest on, then both without regard to case and encoding if exactly one file matches.
 //!
-//! In Shift-JIS, Big5 and GBK the second byte of a character may be a backslash, so a name that is not UTF-8 has
-//! several spellings; the existing files decide.
+//! In Shift-JIS, Big5 and GBK the second byte of a character may be a backslash, so a name that is not UTF-8
+//! has several spellings; the existing files decide.
 
 use super::name::{folded, path, shown};
 use encoding_rs::{BIG5, EUC_KR, Encoding, GB18030, SHIFT_JIS};

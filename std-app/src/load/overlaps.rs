@@ -1,5 +1,5 @@
-//! Triangles that overlap in one plane within rounding: the two sides of a sheet with a material each, surfaces
-//! that lie on others, doubled faces. The core decides for each ray which of them it sees
+//! Triangles that overlap in one plane within rounding: the two sides of a sheet with a material each,
+//! surfaces that lie on others, doubled faces. The core decides for each ray which of them it sees
 //! ([`halflight_core::scene::Scene::visible_hit`]).
 //!
 //! Triangles are sorted by rounded planes. Those of a plane are split by their boxes (Bentley and Wood 1980)

@@ -129,11 +129,16 @@ impl Resolver<'_> {
         Surface::Glossy { base, specular, roughness: self.roughness(), metallic, ior }
     }
 
-    /// True if `Ks` is the level of a highlight and no reflectance: a grey one in a file without PBR keys, which
-    /// would reflect more than all light together with `Kd`. As a reflectance it would hide the base.
+    /// True if `Ks` is the level of a highlight and no reflectance: a grey one of Phong's model (`illum 2`, or
+    /// a texture without `illum`), which would reflect more than all light together with `Kd`. As a
+    /// reflectance it would hide the base.
     fn specular_is_level(&mut self) -> bool {
         let mtl = self.mtl;
-        let is_phong = !is_pbr(mtl) && mtl.metallic.is_none() && !matches!(mtl.illumination, Some(3 | 5));
+        let is_phong = match mtl.illumination {
+            Some(model) => model == 2,
+            None => mtl.has_map(MapKind::Diffuse),
+        };
+        let is_phong = is_phong && !is_pbr(mtl) && mtl.metallic.is_none();
         let has_map = |kind| mtl.has_map(kind);
         let absent = |kind| if has_map(kind) { 1.0 } else { 0.0 };
         // As in `factor`, 0 beside a map is 1.

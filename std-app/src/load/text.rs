@@ -105,8 +105,8 @@ fn utf16(bytes: &[u8]) -> Option<&'static Encoding> {
     }
 }
 
-/// Joins a line that ends in a backslash with the next one, unless that is a statement of its own. A backslash
-/// that ends a comment or a word of a name continues nothing.
+/// Joins a line that ends in a backslash with the next one, unless that is a statement of its own. A
+/// backslash that ends a comment or a word of a name continues nothing.
 fn join_continued_lines(bytes: &mut [u8]) {
     let mut start = 0;
     // True if the statement of the joined lines so far has a name; `None` before its first word.

@@ -36,7 +36,10 @@ pub(super) fn relate(
         let own = triangle.material;
         for (other, part) in others {
             if part < ALL {
-                partly.insert((own.min(other), own.max(other)));
+                // A mesh may fold onto itself.
+                if own != other {
+                    partly.insert((own.min(other), own.max(other)));
+                }
                 continue;
             }
             triangle.material = *related.entry((own, other)).or_insert_with(|| {
