@@ -129,8 +129,8 @@ impl Resolver<'_> {
         Surface::Glossy { base, specular, roughness: self.roughness(), metallic, ior }
     }
 
-    /// True if `Ks` is the level of a highlight and no reflectance: a grey one of Phong's model (`illum 2`, or
-    /// a texture without `illum`), which would reflect more than all light together with `Kd`. As a
+    /// True if `Ks` is the level of a highlight and no reflectance: a grey one of Phong's model (`illum 2`,
+    /// or a texture without `illum`), which would reflect more than all light together with `Kd`. As a
     /// reflectance it would hide the base.
     fn specular_is_level(&mut self) -> bool {
         let mtl = self.mtl;
