@@ -55,6 +55,7 @@ impl SceneBuffers {
                 normals: &self.normals,
                 texcoords: &self.texcoords,
                 triangles: &self.triangles,
+                ..Mesh::default()
             },
             materials: &self.materials,
             textures,

@@ -178,7 +178,7 @@ fn diffuse(scene: &LoadedScene, name: &str) -> ColorInput {
 fn materials_and_textures_are_found() {
     let mtl = b"newmtl a b\nmap_Kd .\\tex\\my wood.bmp\nmap_d -clamp on my wood.bmp\nnewmtl c\nKd 0.25\nmap_Kd gone.png\nnewmtl d\nmap_Kd broken.png";
     let text = format!(
-        "mtllib m y.mtl\n{SQUARE}vt 0 0\nusemtl a b # wood\nf 1/1 2/1 3/1\nusemtl c\nf 1 2 4\nusemtl d\nf 1 3 4\n"
+        "mtllib m y.mtl\n{SQUARE}v 0 4 4\nvt 0 0\nusemtl a b # wood\nf 1/1 2/1 3/1\nusemtl c\nf 1 3 4\nusemtl d\nf 3 4 5\n"
     );
     let wood = bmp([10, 20, 30]);
     let files = [("a.obj", text.as_bytes()), ("m y.mtl", mtl), ("my wood.bmp", &wood), ("broken.png", b"no")];

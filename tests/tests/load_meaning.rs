@@ -163,11 +163,123 @@ fn a_lamp_that_is_there_twice_shines_once() {
         let scene = of(faces);
         assert!(scene.repairs.is_empty(), "{faces}: {:?}", scene.repairs);
     }
-    for faces in ["usemtl a\nf 1 2 3 4\nf 2 3 4 1\n", "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n"] {
-        let scene = of(faces);
-        assert!(scene.triangles.len() > 1);
-        says(&scene, &["in the same place"]);
+    let other = of("usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n");
+    assert_eq!(other.triangles.len(), 1);
+    says(&other, &["lamp `b`", "twice"]);
+    let partly = of("usemtl a\nf 1 2 3\nf 2 3 4\n");
+    assert_eq!(partly.triangles.len(), 2);
+    says(&partly, &["`a` and `a`", "both emit"]);
+}
+
+#[test]
+fn tr_never_hides_a_whole_file_or_a_texture() {
+    let opacities = |mtl: &str| {
+        let scene = scene(&format!("{SQUARE}{FACE}usemtl b\nf 1/1 2/2 3/3\n"), mtl).unwrap();
+        let opacity = |name: &str| {
+            let number = scene.material_names.iter().position(|known| known == name).unwrap();
+            scene.materials[number].opacity.value
+        };
+        ([opacity("a"), opacity("b")], scene.repairs)
+    };
+    let read_as_d = ["Tr 1\nmap_Kd o.bmp\nnewmtl b\nTr 1", "Tr 1.000000\nillum 2\nnewmtl b\nTr 1"];
+    for mtl in read_as_d {
+        let (opacity, notes) = opacities(mtl);
+        assert_eq!(opacity, [1.0, 1.0], "{mtl}");
+        assert!(notes.iter().any(|note| note.contains("`Tr` is read as `d`") && note.contains("2 times")));
     }
+    // In a file that means opacity, all of them do.
+    assert_eq!(opacities("Tr 1\nmap_Kd o.bmp\nnewmtl b\nTr .25").0, [1.0, 0.25]);
+    // A material that is opaque by `Tr 0` settles the meaning; a texture is visible in any case.
+    let (opacity, notes) = opacities("Tr 1\nmap_Kd o.bmp\nnewmtl b\nTr 0");
+    assert_eq!(opacity, [1.0, 1.0]);
+    assert!(notes.iter().any(|note| note.contains("`Tr 1` left out")), "{notes:?}");
+    assert_eq!(opacities("Tr 1\nnewmtl b\nTr 0").0, [0.0, 1.0]);
+    assert_eq!(opacities("Tr .25\nnewmtl b\nTr .5").0, [0.75, 0.5]);
+    // `d` wins, before or after `Tr`, and hides a surface.
+    assert_eq!(opacities("Tr 1\nd .5\nnewmtl b\nd .25\nTr 1").0, [0.5, 0.25]);
+    let (opacity, notes) = opacities("d 0\nmap_Kd o.bmp\nnewmtl b\nTr 0.5");
+    assert_eq!(opacity, [0.0, 0.5]);
+    assert!(notes.iter().any(|note| note.contains("`a` is invisible")), "{notes:?}");
+    // Glass refracts, whatever its `Tr`.
+    assert_eq!(opacities("Tr 1\nillum 7\nNi 1.5\nnewmtl b\nTr .25").0, [1.0, 0.75]);
+}
+
+#[test]
+fn ks_of_phong_files_leaves_the_base_its_weight() {
+    let coat = |mtl: &str| match material(mtl).materials[0].surface {
+        Surface::Glossy { base, specular, .. } => (base.value.x, specular.value.x),
+        Surface::Diffuse { reflectance } => (reflectance.value.x, 0.0),
+        other => panic!("{other:?}"),
+    };
+    let level = |ks: f32| 0.08 * ks;
+    assert_eq!(coat("Kd 1 1 1\nKs .9 .9 .9\nNs 10\nillum 2\nmap_Kd o.bmp"), (1.0, level(0.9)));
+    assert_eq!(coat("Ks .9 .9 .9\nNs 10\nmap_Kd o.bmp"), (1.0, level(0.9)));
+    assert_eq!(coat("Kd .588 .588 .588\nKs .9 .9 .9\nNs 10\nNi 1.5\nmap_Kd o.bmp"), (0.588, level(0.9)));
+    // The default of Blender, which means 0.04.
+    assert_eq!(coat("Kd .8 .8 .8\nKs .5 .5 .5\nNs 250\nNi 1.45\nillum 2"), (0.8, level(0.5)));
+    assert_eq!(coat("Kd 1 1 1\nmap_Kd o.bmp\nmap_Ks h.bmp"), (1.0, level(1.0)));
+    assert_eq!(coat("Kd 1 1 1\nmap_Kd o.bmp\nmap_Ks o.bmp"), (1.0, 1.0));
+    says(&material("Kd 1 1 1\nKs .9 .9 .9\nNs 10\nillum 2"), &["`Kd` and `Ks`", "`a`", "1.9", "0.08"]);
+    assert_eq!(coat("Kd 1 1 1\nKs .04 .04 .04\nNi 1.5\nillum 2").1, 0.04);
+    assert_eq!(coat("Kd 1 1 1\nKs .17 .17 .17\nNi 2.4\nillum 2").1, 0.17);
+    assert_eq!(coat("Kd 1 1 1\nKs .05 .05 .05\nNs 10\nillum 2").1, 0.05);
+    for same in [
+        "Kd .1 .1 .1\nKs .9 .9 .9\nNs 10\nillum 2",
+        "Kd 0 0 0\nKs .9 .9 .9\nNs 10\nillum 2",
+        "Kd .5 .5 .5\nKs .9 .9 .9\nPr .5",
+        "Kd .5 .5 .5\nKs .9 .9 .9\nPm 0",
+        "Kd .75 .61 .23\nKs .9 .55 .37\nNs 51\nillum 2",
+        "Kd .5 .5 .5\nKs .9 .9 .9\nNs 32",
+        "Kd .5 .5 .5\nKs .9 .9 .9\nillum 3",
+    ] {
+        assert_eq!(coat(same).1, 0.9, "{same}");
+    }
+    // A scene file specifies a reflectance.
+    let obj = format!("mtllib m.mtl\n{SQUARE}{FACE}");
+    let toml = "[[mesh]]\nfile = \"q.obj\"\n[material.a]\nspecular = 0.75\n";
+    let mtl = "newmtl a\nKd 1 1 1\nKs .5 .5 .5\n";
+    let files = [("q.obj", obj.as_bytes()), ("m.mtl", mtl.as_bytes()), ("s.toml", toml.as_bytes())];
+    let scene = Files::new(&files).load("s.toml").unwrap();
+    assert!(
+        matches!(scene.materials[0].surface, Surface::Glossy { specular, .. } if specular.value.x == 0.75)
+    );
+}
+
+#[test]
+fn imfchan_selects_the_number_of_a_texel() {
+    // Orange: 1, 0.502, 0.
+    let luminance = 0.2126 + 0.7152 * 128.0 / 255.0;
+    for (option, expected) in [
+        ("", 1.0),
+        ("-imfchan r ", 1.0),
+        ("-imfchan g ", 128.0 / 255.0),
+        ("-imfchan B ", 0.0),
+        ("-imfchan l ", luminance),
+        // Without alpha, luminance is the matte.
+        ("-imfchan m ", luminance),
+        ("-imfchan z ", 1.0),
+    ] {
+        for statement in ["map_d", "map_Pr"] {
+            let scene = material(&format!("Kd 1 1 1\n{statement} {option}o.bmp"));
+            let material = &scene.materials[0];
+            let input = match (statement, material.surface) {
+                ("map_d", _) => material.opacity,
+                (_, Surface::Glossy { roughness, .. }) => roughness,
+                (_, other) => panic!("{other:?}"),
+            };
+            let (id, channel) = input.texture.unwrap();
+            let found = scene.textures.views()[id.0 as usize].lookup(Vec2::ZERO)[usize::from(channel)];
+            assert!((found - expected as f32).abs() < 1e-6, "{statement} {option}: {found}");
+        }
+        let scene = material(&format!("Kd 1 1 1\nbump {option}-bm 1 o.bmp"));
+        let Some(NormalMap::Height(id, _)) = scene.materials[0].normal_map else { panic!("no heights") };
+        let found = scene.textures.views()[id.0 as usize].lookup(Vec2::ZERO)[0];
+        let expected = if matches!(option, "" | "-imfchan z ") { luminance } else { expected };
+        assert!((found - expected as f32).abs() < 1e-6, "bump {option}: {found}");
+    }
+    says(&material("map_d -imfchan m o.bmp"), &["`-imfchan m`", "luminance"]);
+    says(&material("map_d -imfchan z o.bmp"), &["`-imfchan z`", "not supported"]);
+    says(&material("map_Kd -imfchan r o.bmp"), &["`-imfchan`", "colours"]);
 }
 
 #[test]

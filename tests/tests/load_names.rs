@@ -36,7 +36,7 @@ fn greys(rgb: [Rgb; 2]) -> [f32; 2] {
 
 #[test]
 fn materials_are_told_apart_by_all_of_their_names() {
-    let pairs: [[&[u8]; 2]; 7] = [
+    let pairs: [[&[u8]; 2]; 11] = [
         [b"Mat #7", b"Mat #8"],
         [b"a", b"a # b"],
         [b"t\xfcr", b"t\xf6r"],
@@ -44,6 +44,11 @@ fn materials_are_told_apart_by_all_of_their_names() {
         [b"wood", b"wood "],
         [b"old wood", b"old  wood"],
         [b"\"w\"", b"'w'"],
+        // Shift-JIS, Big5 and GBK, whose last bytes are backslashes.
+        [b"\x95\\", b"\x97\xa0"],
+        [b"\xb3\\", b"\xa5\\"],
+        [b"\x83\\ \x83\\", b"\x83\\"],
+        [b"wood\\", b"wood"],
     ];
     for [a, b] in pairs {
         let mtl = join(&[b"newmtl ", a, b"\nKd .1 0 0\nnewmtl ", b, b"\nKd .9 0 0\n"]);
@@ -160,7 +165,7 @@ fn textures_are_found_whatever_their_path_is_like() {
         (b"map_Kd maps\\stone.BMP", 70, true),
         (b"map_Kd C:/x/Maps/Stone.bmp -s 3 3", 70, true),
         (b"norm end ", 80, false),
-        (b"bump -bm 1 -gamma 2.2 t.bmp", 10, true),
+        (b"map_Ke -bm 1 -gamma 2.2 t.bmp", 10, true),
     ];
     for (statement, red, said) in cases {
         let shown = String::from_utf8_lossy(statement);

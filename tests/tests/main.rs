@@ -29,6 +29,7 @@ mod load;
 mod load_collection;
 mod load_meaning;
 mod load_names;
+mod load_sides;
 mod load_support;
 mod lobe_rooms;
 mod photon_map;

@@ -25,7 +25,7 @@ impl Soup {
         soup
     }
     fn mesh(&self) -> Mesh<'_> {
-        Mesh { positions: &self.positions, normals: &[], texcoords: &[], triangles: &self.triangles }
+        Mesh { positions: &self.positions, triangles: &self.triangles, ..Mesh::default() }
     }
 }
 

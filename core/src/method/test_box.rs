@@ -51,7 +51,7 @@ pub(super) fn with_box<T>(materials: [Material; 4], work: impl FnOnce(&RenderCon
         [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, material })
     };
     let triangles: Vec<Triangle> = quads.into_iter().flat_map(halves).collect();
-    let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+    let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
     let camera = Camera::look_at(Vec3::new(0.5, 0.5, 0.9), Vec3::new(0.5, 0.5, 0.0), Vec3::Y, 70.0);
     let scene = Scene { mesh, materials: &materials, textures: &[], lights: &[], environment: None, camera };
 

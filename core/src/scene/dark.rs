@@ -66,6 +66,7 @@ mod tests {
             normals: &[],
             texcoords: &[],
             triangles: &[Triangle { vertices: [0, 1, 2], material: 0 }],
+            overlaps: &[],
         },
         materials: &[],
         textures: &[],

@@ -1,5 +1,6 @@
 //! Indexed triangle mesh. Positions, normals and texture coordinates share one index per vertex.
 
+use super::overlap::Overlap;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
@@ -24,6 +25,8 @@ pub struct Mesh<'a> {
     pub texcoords: &'a [[f32; 2]],
     /// Triangles.
     pub triangles: &'a [Triangle],
+    /// Pairs of triangles that overlap in one plane, in both orders, ascending; or empty.
+    pub overlaps: &'a [Overlap],
 }
 
 impl<'a> Mesh<'a> {

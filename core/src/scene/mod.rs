@@ -9,6 +9,7 @@ mod input;
 mod light;
 mod material;
 mod mesh;
+mod overlap;
 mod surface;
 mod texture;
 
@@ -18,6 +19,7 @@ pub use input::{ColorInput, ScalarInput};
 pub use light::{Environment, PointLight};
 pub use material::{Material, NormalMap, Surface};
 pub use mesh::{Mesh, Triangle};
+pub use overlap::Overlap;
 pub use surface::SurfacePoint;
 pub(crate) use texture::load;
 pub use texture::{Texels, Texture, TextureId, TextureTransform, Wrap};

@@ -1,8 +1,13 @@
 //! Lookup of the files that statements name. Names come from other machines: with other folders, with
 //! backslashes, in another case or encoding. The exact name is tried first, then each tail of the path from
 //! the longest on, then both without regard to case and encoding if exactly one file matches.
+//!
+//! In Shift-JIS, Big5 and GBK the second byte of a character may be a backslash, so a name that is not UTF-8
+//! has several spellings; the existing files decide.
 
 use super::name::{folded, path, shown};
+use encoding_rs::{BIG5, EUC_KR, Encoding, GB18030, SHIFT_JIS};
+use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -83,23 +88,26 @@ impl Lookup {
                 return Found::Exact(file, number);
             }
         }
-        for (number, name) in names() {
-            let parts = parts(name);
-            for tail in (1..parts.len()).map(|first| path(&parts[first..].join(&b'/'))) {
+        let spellings: Vec<(usize, Spelling)> =
+            names().flat_map(|(number, name)| spellings(name).map(move |text| (number, text))).collect();
+        for (number, spelling) in &spellings {
+            let parts = spelling.parts();
+            let first = usize::from(spelling.is_written);
+            for tail in (first..parts.len()).map(|first| path(&parts[first..].join(&b'/'))) {
                 let mut files = directories.iter().map(|directory| directory.join(&tail));
                 if let Some(file) = files.find(|file| file.is_file()) {
-                    return Found::Instead(file, number);
+                    return Found::Instead(file, *number);
                 }
             }
         }
-        for (number, name) in names() {
-            let parts = parts(name);
+        for (number, spelling) in &spellings {
+            let parts = spelling.parts();
             for first in 0..parts.len() {
                 for directory in directories {
                     let mut files = self.any_case(directory, &parts[first..]);
                     match files.len() {
                         0 => {}
-                        1 => return Found::Instead(files.remove(0), number),
+                        1 => return Found::Instead(files.remove(0), *number),
                         _ => return Found::Ambiguous(files),
                     }
                 }
@@ -142,16 +150,78 @@ impl Lookup {
 
 /// The file of exactly this name, or of this name with slashes for backslashes.
 fn exact(directory: &Path, name: &[u8]) -> Option<PathBuf> {
-    let slashes: Vec<u8> = name.iter().map(|&byte| if byte == b'\\' { b'/' } else { byte }).collect();
-    [name, &slashes].into_iter().map(|name| directory.join(path(name))).find(|file| file.is_file())
+    let with_slashes = |characters: Characters| {
+        let is_separator = |at: &usize| name[*at] == b'\\';
+        let mut slashes = name.to_vec();
+        characters.starts(name).filter(is_separator).for_each(|at| slashes[at] = b'/');
+        slashes
+    };
+    let slashes = [Characters::Bytes, Characters::Pairs].map(with_slashes);
+    let names = [name, &slashes[0], &slashes[1]];
+    names.into_iter().map(|name| directory.join(path(name))).find(|file| file.is_file())
 }
 
-/// The last parts of a path of any system, without empty ones and `.`.
-fn parts(name: &[u8]) -> Vec<&[u8]> {
-    let parts = name.split(|byte| matches!(byte, b'/' | b'\\' | b':'));
-    let parts: Vec<&[u8]> = parts.filter(|part| !part.is_empty() && *part != b".").collect();
-    let first = parts.len().saturating_sub(MOST_PARTS);
-    parts[first..].to_vec()
+/// Bytes of a character.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Characters {
+    /// One, or UTF-8, in which only a backslash has the byte of a backslash.
+    Bytes,
+    /// One of ASCII, else two: Shift-JIS, Big5, GBK.
+    Pairs,
+}
+
+impl Characters {
+    /// Indices at which characters of `name` begin.
+    fn starts(self, name: &[u8]) -> impl Iterator<Item = usize> {
+        let mut next = 0;
+        (0..name.len()).filter(move |&at| {
+            let is_start = at >= next;
+            let is_pair = self == Self::Pairs && name[at] >= 0x81;
+            next = if is_start { at + 1 + usize::from(is_pair) } else { next };
+            is_start
+        })
+    }
+}
+
+/// A possible text of a name.
+struct Spelling<'a> {
+    text: Cow<'a, [u8]>,
+    characters: Characters,
+    /// The whole text was tried as a name already.
+    is_written: bool,
+}
+
+/// Spellings of a name, the likeliest first; more than one if it is not UTF-8.
+fn spellings(name: &[u8]) -> impl Iterator<Item = Spelling<'_>> {
+    const ENCODINGS: [&Encoding; 4] = [SHIFT_JIS, GB18030, BIG5, EUC_KR];
+    let written = |characters| Spelling { text: name.into(), characters, is_written: true };
+    let is_foreign = core::str::from_utf8(name).is_err();
+    let decoded = ENCODINGS.into_iter().filter(move |_| is_foreign).filter_map(|encoding| {
+        let text = encoding.decode_without_bom_handling_and_without_replacement(name)?;
+        let text = text.into_owned().into_bytes().into();
+        Some(Spelling { text, characters: Characters::Bytes, is_written: false })
+    });
+    let pairs = is_foreign.then(|| written(Characters::Pairs));
+    [written(Characters::Bytes)].into_iter().chain(pairs).chain(decoded)
+}
+
+impl Spelling<'_> {
+    /// The last parts of a path of any system, without empty ones and `.`.
+    fn parts(&self) -> Vec<&[u8]> {
+        let text = &self.text[..];
+        let is_separator = |at: &usize| matches!(text[*at], b'/' | b'\\' | b':');
+        let mut parts = Vec::new();
+        let mut begin = 0;
+        for end in self.characters.starts(text).filter(is_separator).chain([text.len()]) {
+            let part = &text[begin..end];
+            if !part.is_empty() && part != b"." {
+                parts.push(part);
+            }
+            begin = end + 1;
+        }
+        let first = parts.len().saturating_sub(MOST_PARTS);
+        parts.split_off(first)
+    }
 }
 
 #[cfg(test)]
@@ -206,6 +276,44 @@ mod tests {
         with_files("latin", &["grün.png"], |root| {
             let found = Lookup::default().locate(&[b"gr\xfcn.png"], &[root]);
             assert_eq!(found, Found::Instead(root.join("grün.png"), 0));
+        });
+    }
+
+    /// A directory, and a file in it, in Shift-JIS: the second byte of the second character of each is a
+    /// backslash.
+    const SHIFT_JIS_PATH: &[u8] = b"\x90\x94\x94\x5c\\\x8e\x91\x97\x5c.png";
+
+    #[test]
+    #[cfg(unix)]
+    fn double_byte_names_match_files_of_the_same_bytes() {
+        with_files("bytes", &["here"], |root| {
+            let [_, folder, file] =
+                [&b"x"[..], b"\x90\x94\x94\x5c", b"\x8e\x91\x97\x5c.png"].map(|part| root.join(path(part)));
+            let file = folder.join(file.file_name().unwrap());
+            fs::create_dir_all(&folder).unwrap();
+            fs::write(&file, "").unwrap();
+            let locate = |name: &[u8], folder: &Path| Lookup::default().locate(&[name], &[folder]);
+            assert_eq!(locate(SHIFT_JIS_PATH, root), Found::Exact(file.clone(), 0));
+            assert_eq!(locate(b"\x8e\x91\x97\x5c.png", &folder), Found::Exact(file.clone(), 0));
+            let absolute = [b"C:\\art\\", SHIFT_JIS_PATH].concat();
+            assert_eq!(locate(&absolute, root), Found::Instead(file.clone(), 0));
+            assert_eq!(locate(&absolute, &folder), Found::Instead(file.clone(), 0));
+            assert_eq!(locate(b"\x8e\x91\x97\x5d.png", &folder), Found::Missing);
+        });
+    }
+
+    #[test]
+    fn double_byte_names_match_utf_8_files() {
+        let decoded = SHIFT_JIS.decode(SHIFT_JIS_PATH).0.replace('\\', "/");
+        let big5 = BIG5.encode("\u{8a31}\u{529f}.png").0.into_owned();
+        assert!(big5.contains(&b'\\'));
+        let gbk = GB18030.encode("\u{8a31}.png").0.into_owned();
+        let files = [&decoded[..], "\u{8a31}\u{529f}.png", "\u{8a31}.png"];
+        with_files("decoded", &files, |root| {
+            for (name, file) in [SHIFT_JIS_PATH, &big5, &gbk].into_iter().zip(files) {
+                let found = Lookup::default().locate(&[name], &[root]);
+                assert_eq!(found, Found::Instead(root.join(file), 0), "{name:x?}");
+            }
         });
     }
 

@@ -20,6 +20,15 @@ pub struct Map {
     pub options: MapOptions,
 }
 
+/// The number that a map takes from a texel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// 0 red, 1 green, 2 blue, 3 matte, which is alpha.
+    Component(u8),
+    /// Luminance.
+    Luminance,
+}
+
 /// The options of a texture statement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapOptions {
@@ -31,8 +40,8 @@ pub struct MapOptions {
     pub clamp: bool,
     /// `-bm`.
     pub bump_multiplier: Option<f64>,
-    /// `-imfchan r|g|b|m`: the channel of a scalar map.
-    pub channel: Option<u8>,
+    /// `-imfchan r|g|b|m|l`: the channel of a scalar map or of heights.
+    pub channel: Option<Channel>,
     /// Options without effect.
     pub unsupported: Vec<Name>,
 }
@@ -243,14 +252,18 @@ fn option(tokens: &[Token], at: usize, options: &mut MapOptions) -> Option<usize
             switch
         }
         b"imfchan" => {
-            options.channel = match value {
-                b"r" => Some(0),
-                b"g" => Some(1),
-                b"b" => Some(2),
-                b"m" => Some(3),
-                _ => None,
-            };
-            usize::from(matches!(value, b"r" | b"g" | b"b" | b"m" | b"l" | b"z"))
+            let letter = value.to_ascii_lowercase();
+            match &letter[..] {
+                b"r" => options.channel = Some(Channel::Component(0)),
+                b"g" => options.channel = Some(Channel::Component(1)),
+                b"b" => options.channel = Some(Channel::Component(2)),
+                b"m" => options.channel = Some(Channel::Component(3)),
+                b"l" => options.channel = Some(Channel::Luminance),
+                // Pictures of surfaces have no depth.
+                b"z" => options.unsupported.push("-imfchan z".into()),
+                _ => {}
+            }
+            usize::from(matches!(&letter[..], b"r" | b"g" | b"b" | b"m" | b"l" | b"z"))
         }
         b"blendu" | b"blendv" | b"cc" => {
             unsupported();
@@ -309,7 +322,28 @@ mod tests {
             assert_eq!(plain_name(plain.as_bytes()), b"dark wood.png", "{operand}");
         }
         let height = options("-bm 0.2 -imfchan g h.png", "h.png");
-        assert_eq!((height.bump_multiplier, height.channel), (Some(0.2), Some(1)));
+        assert_eq!((height.bump_multiplier, height.channel), (Some(0.2), Some(Channel::Component(1))));
+    }
+
+    #[test]
+    fn channels_of_scalar_maps() {
+        let component = |i| Some(Channel::Component(i));
+        let channels = [
+            ("r", component(0)),
+            ("G", component(1)),
+            ("b", component(2)),
+            ("M", component(3)),
+            ("l", Some(Channel::Luminance)),
+            ("z", None),
+        ];
+        for (letter, channel) in channels {
+            for operand in [format!("-imfchan {letter} t.png"), format!("t.png -imfchan {letter}")] {
+                let options = options(&operand, "t.png");
+                assert_eq!(options.channel, channel, "{operand}");
+                assert_eq!(options.unsupported.len(), usize::from(letter == "z"), "{operand}");
+            }
+        }
+        assert_eq!(names("-imfchan x t.png")[0], "x t.png");
     }
 
     #[test]

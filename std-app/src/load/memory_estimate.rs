@@ -128,13 +128,18 @@ pub(super) fn of_mesh(obj: &Obj) -> usize {
 }
 
 /// Bytes that [`super::geometry::assemble`] takes: vertices in f64 and f32, triangles, and both twice while
-/// parts are joined. The search for duplicate lamps and open glass takes as much again.
+/// parts are joined. The search for open glass and for triangles in one plane takes as much again.
 pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
     let is_searched =
         |material: &Material| material.emits() || matches!(material.surface, Surface::Dielectric { .. });
+    let are_several = parts.windows(2).any(|pair| pair[0].material != pair[1].material);
     let of_part = |part: &Placed| {
         let searched = materials.get(part.material as usize).is_some_and(is_searched);
-        let of_triangle = if searched { 232 } else { 32 };
+        let of_triangle = match (searched, are_several) {
+            (true, _) => 232,
+            (false, true) => 112,
+            (false, false) => 32,
+        };
         96 * part.group.positions.len() + of_triangle * part.group.triangles.len()
     };
     parts.iter().fold(0, |sum, part| sum.saturating_add(of_part(part)))

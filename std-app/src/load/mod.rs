@@ -20,6 +20,7 @@ mod name;
 mod notes;
 pub mod obj;
 mod open_glass;
+mod overlaps;
 mod parts;
 mod relief;
 mod scene;
@@ -30,10 +31,11 @@ mod texcoords;
 mod text;
 mod texture;
 mod texture_set;
+mod touching_glass;
 mod transform;
 
 pub use error::LoadError;
-pub use map::{Map, MapOptions};
+pub use map::{Channel, Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
 pub use parts::{MaterialId, PartMesh, SceneParts};
@@ -278,16 +280,21 @@ impl SceneBuilder {
             Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
         };
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
-        let resolved = |(number, mtl): (u32, &MtlMaterial)| match self.given.get(&number) {
+        let given = &self.given;
+        let resolved = |(number, mtl): (u32, &MtlMaterial)| match given.get(&number) {
             Some(material) => *material,
             None => surface::resolve(mtl, &mut textures, notes),
         };
-        let materials: Vec<Material> = (0..).zip(&self.materials).map(resolved).collect();
+        let mut materials: Vec<Material> = (0..).zip(&self.materials).map(resolved).collect();
+        notes.merge(core::mem::take(&mut textures.notes));
         let environment = environment.map(|entry| Environment {
             radiance: entry.radiance,
             map: textures.colour(entry.map.as_ref()),
             to_map: entry.to_map,
         });
+
+        let derived = textures.derived_bytes();
+        self.budget.take(derived).map_err(|why| too_large(path, &why))?;
 
         let mut parts = Vec::new();
         for mesh in &self.meshes {
@@ -305,14 +312,20 @@ impl SceneBuilder {
         self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
         let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
-        let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
-        duplicate_emitters::remove(&mut geometry, &materials, &names, notes);
+        let mut names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
+        let mut overlaps = overlaps::locate(&geometry, &materials);
+        if duplicate_emitters::remove(&mut geometry, &overlaps, &materials, &names, notes) {
+            overlaps = overlaps::locate(&geometry, &materials);
+        }
+        overlaps::note(&overlaps, &geometry.triangles, &materials, &names, notes);
+        touching_glass::relate(&mut geometry, &overlaps, &mut materials, &mut names, notes);
         open_glass::note(&geometry, &materials, &names, notes);
         Ok(LoadedScene {
             positions: geometry.positions,
             normals: geometry.normals,
             texcoords: geometry.texcoords,
             triangles: geometry.triangles,
+            overlaps: overlaps::both_orders(&overlaps),
             materials,
             material_names: names,
             textures,

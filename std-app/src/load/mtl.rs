@@ -34,6 +34,8 @@ pub struct MtlMaterial {
     pub illumination: Option<u32>,
     /// Not in MTL: the scene file specifies glass, whatever the other statements suggest.
     pub surely_glass: bool,
+    /// Not in MTL: the scene file specifies `Ks`, which is a reflectance.
+    pub surely_reflects: bool,
     /// Not in MTL: both sides emit.
     pub two_sided: bool,
     /// Texture statements.
@@ -89,6 +91,7 @@ pub fn parse(bytes: Vec<u8>, file: &str) -> Mtl {
         mtl.notes.at(0, "material library that is not text left out");
         return mtl;
     };
+    let mut transparencies: Vec<Transparency> = Vec::new();
     let mut has_d = false;
     for (line, text) in Lines::new(&text, 1) {
         let mut operands = words(text);
@@ -105,9 +108,56 @@ pub fn parse(bytes: Vec<u8>, file: &str) -> Mtl {
             notes.at(line, "statement before the first `newmtl` left out");
             continue;
         };
-        Statement { keyword: &keyword, operands, line, notes }.apply(material, &mut has_d);
+        let mut statement = Statement { keyword: &keyword, operands, line, notes };
+        if keyword == "tr" {
+            let mut value = None;
+            statement.scalar(&mut value);
+            let material = mtl.materials.len() - 1;
+            // Some exporters write `Tr` with the value of `d`, so `d` wins.
+            transparencies.extend(value.filter(|_| !has_d).map(|value| Transparency {
+                material,
+                line,
+                value,
+            }));
+        } else {
+            statement.apply(material, &mut has_d);
+            if has_d {
+                while transparencies.pop_if(|last| last.material + 1 == mtl.materials.len()).is_some() {}
+            }
+        }
     }
+    apply_transparencies(&transparencies, &mut mtl);
     mtl
+}
+
+/// A `Tr` of a material without `d`.
+struct Transparency {
+    /// Index of the material.
+    material: usize,
+    line: u32,
+    value: f64,
+}
+
+/// Sets opacities by `Tr`, which is 1 - `d` in most programs and `d` in others, such as MeshLab. Nobody
+/// writes surfaces that are all invisible: a file means `d` if some `Tr` is 1 and none is 0, and a textured
+/// surface is visible in any case.
+fn apply_transparencies(transparencies: &[Transparency], mtl: &mut Mtl) {
+    let Mtl { materials, notes } = mtl;
+    // The opacity of glass has no effect.
+    let counts = |of: &&Transparency| !matches!(materials[of.material].illumination, Some(4 | 6 | 7 | 9));
+    let mut values = transparencies.iter().filter(counts).map(|of| of.value);
+    let means_opacity = values.clone().any(|tr| tr >= 1.0) && !values.any(|tr| tr <= 0.0);
+    for Transparency { material, line, value } in transparencies {
+        let material = &mut materials[*material];
+        let is_hidden = *value >= 1.0 && material.has_map(MapKind::Diffuse);
+        let (opacity, note) = match (means_opacity, is_hidden) {
+            (true, _) => (*value, Some("`Tr` is read as `d`: as 1 - `d`, a material would be invisible")),
+            (false, true) => (1.0, Some("`Tr 1` left out: it would hide a texture")),
+            (false, false) => (1.0 - value, None),
+        };
+        material.opacity = Some(opacity);
+        note.into_iter().for_each(|note| notes.at(*line, note));
+    }
 }
 
 struct Statement<'a> {
@@ -139,13 +189,6 @@ impl Statement<'_> {
                 self.scalar(&mut opacity);
                 *has_d |= opacity.is_some();
                 material.opacity = opacity.or(material.opacity);
-            }
-            // Some exporters write `Tr` with the value of `d`, so `d` wins.
-            "tr" if *has_d => {}
-            "tr" => {
-                let mut transparency = None;
-                self.scalar(&mut transparency);
-                material.opacity = transparency.map(|tr| 1.0 - tr).or(material.opacity);
             }
             "illum" => {
                 let mut model = None;

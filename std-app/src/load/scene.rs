@@ -6,7 +6,9 @@ use super::transform::{SceneTransform, direction};
 use crate::values::{Depth, MethodName, Samples, Seconds, Size, TargetError};
 use glam::{DVec3, Vec3};
 use halflight_core::geometry::Bounds;
-use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
+use halflight_core::scene::{
+    Camera, Environment, Material, Mesh, Overlap, PointLight, Scene, Texture, Triangle,
+};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -21,6 +23,8 @@ pub struct LoadedScene {
     pub texcoords: Vec<[f32; 2]>,
     /// All triangles.
     pub triangles: Vec<Triangle>,
+    /// Pairs of triangles that overlap in one plane, in both orders, ascending.
+    pub overlaps: Vec<Overlap>,
     /// Materials of the triangles.
     pub materials: Vec<Material>,
     /// Names of the materials.
@@ -109,6 +113,7 @@ impl LoadedScene {
             normals: &self.normals,
             texcoords: &self.texcoords,
             triangles: &self.triangles,
+            overlaps: &self.overlaps,
         }
     }
 

@@ -4,8 +4,10 @@
 mod inputs;
 
 use super::illum::{self, DARK_BASE, is_glass, is_pbr};
+use super::map::Map;
 use super::mtl::{MapKind, MtlMaterial};
 use super::notes::Notes;
+use super::relief::Relief;
 use super::texture_set::TextureSet;
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Material, ScalarInput, Surface};
@@ -13,6 +15,12 @@ use halflight_core::scene::{ColorInput, Material, ScalarInput, Surface};
 /// Relative difference of `Ks` and the Fresnel reflectance of `Ni` up to which a coat is a dielectric: files
 /// have two or three digits.
 const PLASTIC_TOLERANCE: f64 = 0.05;
+/// Reflectance at normal incidence of a coat whose `Ks` is 1 if `Ks` is a level: 0.04 at 0.5, as in Blender.
+const LEVEL: f32 = 0.08;
+/// Largest sum of `Kd` and `Ks`, if both are reflectances, rounded in the file.
+const MOST_REFLECTANCE: f64 = 1.005;
+/// Largest difference of the channels of a grey `Ks`.
+const GREY: f64 = 0.01;
 /// Index of refraction of glass and PBR coats without `Ni`.
 const DEFAULT_IOR: f64 = 1.5;
 
@@ -106,7 +114,9 @@ impl Resolver<'_> {
     /// Diffuse, under a coat if there is one.
     fn coated(&mut self, base: ColorInput, metallic: ScalarInput) -> Surface {
         let (specular, ior) = if self.has_specular() {
-            (self.specular(), self.plastic_ior())
+            let (specular, ior) = (self.specular(), self.plastic_ior());
+            let factor = if ior.is_none() && self.specular_is_level() { LEVEL } else { 1.0 };
+            (ColorInput { value: factor * specular.value, ..specular }, ior)
         } else if is_pbr(self.mtl) {
             let ior = self.ior().unwrap_or(DEFAULT_IOR);
             (Rgb::splat(fresnel(ior) as f32).into(), Some(ior as f32))
@@ -117,6 +127,42 @@ impl Resolver<'_> {
             return Surface::Diffuse { reflectance: base };
         }
         Surface::Glossy { base, specular, roughness: self.roughness(), metallic, ior }
+    }
+
+    /// True if `Ks` is the level of a highlight and no reflectance: a grey one of Phong's model (`illum 2`,
+    /// or a texture without `illum`), which would reflect more than all light together with `Kd`. As a
+    /// reflectance it would hide the base.
+    fn specular_is_level(&mut self) -> bool {
+        let mtl = self.mtl;
+        let is_phong = match mtl.illumination {
+            Some(model) => model == 2,
+            None => mtl.has_map(MapKind::Diffuse),
+        };
+        let is_phong = is_phong && !is_pbr(mtl) && mtl.metallic.is_none();
+        let has_map = |kind| mtl.has_map(kind);
+        let absent = |kind| if has_map(kind) { 1.0 } else { 0.0 };
+        // As in `factor`, 0 beside a map is 1.
+        let value = |given: Option<[f64; 3]>, kind| match given {
+            Some(value) if !(has_map(kind) && value == [0.0; 3]) => value,
+            _ => [absent(kind); 3],
+        };
+        let (kd, ks) = (value(mtl.diffuse, MapKind::Diffuse), value(mtl.specular, MapKind::Specular));
+        let is_grey_map = |map: &Map| self.textures.relief(map) == Some(Relief::Heights);
+        let is_grey = ks.iter().all(|x| (x - ks[0]).abs() <= GREY);
+        let is_grey = is_grey && mtl.map(MapKind::Specular).is_none_or(is_grey_map);
+        // Dielectrics reflect less than `LEVEL`.
+        let is_too_much =
+            ks[0] > f64::from(LEVEL) && kd.iter().zip(ks).any(|(kd, ks)| kd + ks > MOST_REFLECTANCE);
+        let is_level = is_phong && !mtl.surely_reflects && is_grey && is_too_much;
+        if is_level {
+            let (name, sum) = (&mtl.name, kd[0].max(kd[1]).max(kd[2]) + ks[0]);
+            let note = format!(
+                "`Kd` and `Ks` of material `{name}` sum to {sum:.2}: `Ks` is the level of a highlight, and the coat \
+                 reflects {LEVEL} times as much"
+            );
+            self.notes.add(1, note);
+        }
+        is_level
     }
 
     /// Index of a coat whose `Ks` is the Fresnel reflectance of its `Ni`.

@@ -1,6 +1,8 @@
 //! Text of OBJ and MTL files: decoded, with continued lines joined, then lines and words. Names stay bytes
 //! until they are shown.
 
+use encoding_rs::{Encoding, UTF_16BE, UTF_16LE};
+
 /// The bytes are not text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Binary;
@@ -8,11 +10,71 @@ pub(super) struct Binary;
 /// Replaces the end of a line that continues: blank to [`words`], but counted by [`Lines`]. The vertical tab.
 const JOINED: u8 = 0x0b;
 
+/// Statements whose operand is a name. It keeps a backslash at its end, which may be the second byte of a
+/// character in Shift-JIS, Big5 or GBK.
+const NAMING: [&str; 15] = [
+    "bump", "call", "csh", "decal", "disp", "g", "maplib", "mtllib", "newmtl", "norm", "o", "refl", "s",
+    "usemap", "usemtl",
+];
+
+/// Other statements of OBJ and MTL files: a line that begins with one does not continue the line before.
+const OTHERS: [&str; 49] = [
+    "aniso",
+    "anisor",
+    "bevel",
+    "bmat",
+    "c_interp",
+    "con",
+    "cstype",
+    "ctech",
+    "curv",
+    "curv2",
+    "d",
+    "d_interp",
+    "deg",
+    "end",
+    "f",
+    "fo",
+    "hole",
+    "illum",
+    "ka",
+    "kd",
+    "ke",
+    "ks",
+    "l",
+    "lod",
+    "mg",
+    "ni",
+    "ns",
+    "p",
+    "parm",
+    "pc",
+    "pcr",
+    "pm",
+    "pr",
+    "ps",
+    "scrv",
+    "shadow_obj",
+    "sharpness",
+    "sp",
+    "stech",
+    "step",
+    "surf",
+    "tf",
+    "tr",
+    "trace_obj",
+    "trim",
+    "v",
+    "vn",
+    "vp",
+    "vt",
+];
+
 /// Decodes UTF-8 and UTF-16 with or without a byte-order mark, turns lone carriage returns into line ends and
-/// joins lines that end in a backslash, except comments. Ill-formed UTF-8 is kept.
+/// joins lines that end in a backslash, except comments and names. Ill-formed UTF-8 is kept.
 pub(super) fn normalise(mut bytes: Vec<u8>) -> Result<Vec<u8>, Binary> {
-    if let Some(decoded) = decode_utf16(&bytes) {
-        bytes = decoded;
+    if let Some(encoding) = utf16(&bytes) {
+        bytes = encoding.decode_with_bom_removal(&bytes).0.into_owned().into_bytes();
     } else if bytes.starts_with(&[0xef, 0xbb, 0xbf]) {
         bytes.drain(..3);
     }
@@ -32,36 +94,62 @@ pub(super) fn normalise(mut bytes: Vec<u8>) -> Result<Vec<u8>, Binary> {
     Ok(bytes)
 }
 
-/// UTF-8 of UTF-16, which has a byte-order mark, or a zero in the same half of the first two pairs.
-fn decode_utf16(bytes: &[u8]) -> Option<Vec<u8>> {
-    let (start, big_endian) = match *bytes {
-        [0xff, 0xfe, ..] => (2, false),
-        [0xfe, 0xff, ..] => (2, true),
-        [a, 0, b, 0, ..] if a != 0 && b != 0 => (0, false),
-        [0, a, 0, b, ..] if a != 0 && b != 0 => (0, true),
-        _ => return None,
-    };
-    let from_bytes = if big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
-    let units = bytes[start..].chunks_exact(2).map(|pair| from_bytes([pair[0], pair[1]]));
-    let text: String = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
-    Some(text.into_bytes())
+/// The byte order of UTF-16, which has a byte-order mark, or a zero in the same half of the first two pairs.
+fn utf16(bytes: &[u8]) -> Option<&'static Encoding> {
+    match *bytes {
+        [0xff, 0xfe, ..] => Some(UTF_16LE),
+        [0xfe, 0xff, ..] => Some(UTF_16BE),
+        [a, 0, b, 0, ..] if a != 0 && b != 0 => Some(UTF_16LE),
+        [0, a, 0, b, ..] if a != 0 && b != 0 => Some(UTF_16BE),
+        _ => None,
+    }
 }
 
+/// Joins a line that ends in a backslash with the next one, unless that is a statement of its own. A
+/// backslash that ends a comment or a word of a name continues nothing.
 fn join_continued_lines(bytes: &mut [u8]) {
-    let mut start = 0; // of the joined line
-    for end in 0..bytes.len() {
-        if bytes[end] != b'\n' {
-            continue;
+    let mut start = 0;
+    // True if the statement of the joined lines so far has a name; `None` before its first word.
+    let mut has_name = None;
+    while start < bytes.len() {
+        let end = line_end(bytes, start);
+        let line = &bytes[start..end];
+        let last = line.iter().rposition(|b| !is_blank(*b)).filter(|&last| line[last] == b'\\');
+        let last = last.filter(|_| !word_starts(line).any(|at| line[at] == b'#'));
+        let mut is_joined = false;
+        if let Some(last) = last {
+            has_name = has_name.or_else(|| words(line).next().map(|word| is_one_of(word, &NAMING)));
+            let (names, is_word) = (has_name == Some(true), last == 0 || is_blank(line[last - 1]));
+            let next = bytes.get(end + 1..line_end(bytes, end + 1)).unwrap_or_default();
+            let is_last = end == bytes.len() || words(next).next().is_some_and(begins_statement);
+            is_joined = !is_last && (is_word || !names);
+            if is_joined || !names {
+                bytes[start + last] = b' ';
+            }
         }
-        let line = trimmed(&bytes[start..end]);
-        if line.ends_with(b"\\") && !line.starts_with(b"#") {
-            let last = bytes[start..end].iter().rposition(|b| !is_blank(*b)).unwrap_or_default();
-            bytes[start + last] = b' ';
+        if is_joined {
             bytes[end] = JOINED;
         } else {
-            start = end + 1;
+            has_name = None;
         }
+        start = end + 1;
     }
+}
+
+/// Index of the first line end from `start` on.
+fn line_end(bytes: &[u8], start: usize) -> usize {
+    let rest = bytes.get(start..).unwrap_or_default();
+    rest.iter().position(|&b| b == b'\n').map_or(bytes.len(), |at| start + at)
+}
+
+fn begins_statement(word: &[u8]) -> bool {
+    is_one_of(word, &NAMING) || is_one_of(word, &OTHERS)
+}
+
+/// True if `word` is one of `keywords`, in any case, or the keyword of a map.
+fn is_one_of(word: &[u8], keywords: &[&str]) -> bool {
+    word.get(..4).is_some_and(|start| start.eq_ignore_ascii_case(b"map_"))
+        || keywords.iter().any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
 }
 
 /// True if a byte separates words.
@@ -199,6 +287,64 @@ mod tests {
         assert_eq!(lines("\u{feff}v 1 \\\n 2 3\nf 1\n# c \\\nx"), expected);
         assert_eq!(lines("v 1 \\\r\n 2 3\r\nf 1\r\n# c \\\r\nx"), expected);
         assert_eq!(lines("v 1 \\\r 2 3\rf 1\r# c \\\rx"), expected);
+    }
+
+    #[test]
+    fn numbers_and_lists_continue_and_comments_and_names_do_not() {
+        let joined = [
+            "f 1 2\\\n 3",
+            "f 1 \\  \n 2 \\\t\r\n3",
+            "v 1\\\r2\\\r3",
+            "Kd .5 \\\n.5 .5",
+            "mtllib a.mtl \\\nb.mtl",
+            "map_Kd -s 1 1 1 \\\n t.png",
+            "g a \\\n b",
+        ];
+        for text in joined {
+            let parts: Vec<&str> =
+                text.split(['\\', '\n', '\r', ' ', '\t']).filter(|w| !w.is_empty()).collect();
+            assert_eq!(lines(text), [(1, parts.join(" "))], "{text:?}");
+        }
+        let apart = [
+            "v 1 2 3 # C:\\models\\",
+            "v 1 2 3 #\\",
+            "# C:\\models\\",
+            "  # \\",
+            "Kd 1 1 1 # \\",
+            "usemtl wood\\",
+            "newmtl 1 2\\  ",
+            "MAP_KD textures\\",
+            "map_Kd Map #5\\",
+            "usemtl a # old \\",
+            "usemtl a \\",
+            "o C:\\",
+        ];
+        for text in apart {
+            for end in ["\n", "\r\n", "\r"] {
+                let read = lines(&format!("{text}{end}v 1 2 3{end}usemtl b"));
+                let rest = [(2, "v 1 2 3".to_string()), (3, "usemtl b".into())];
+                assert_eq!(read[1..], rest, "{text:?} {end:?}");
+            }
+        }
+        let name = |text: &[u8]| {
+            let text = normalise(text.to_vec()).unwrap();
+            let (_, line) = Lines::new(&text, 1).next().unwrap();
+            let mut words = words(line);
+            words.next();
+            words.rest().to_vec()
+        };
+        for bytes in [&b"\x95\x5c"[..], b"a \x83\x5c", b"\xa5\x5c", b"wood\\", b"a \\"] {
+            assert_eq!(name(&[b"usemtl ", bytes, b"\nf 1 2 3\n"].concat()), bytes);
+        }
+    }
+
+    #[test]
+    fn backslash_before_a_statement_or_the_end_means_nothing() {
+        let expected = [(1, "f 1 2 3".to_string()), (2, "f 4 5 6".into())];
+        assert_eq!(lines("f 1 2 3 \\\nf 4 5 6\\"), expected);
+        assert_eq!(lines("f 1 2 3\\\r\nf 4 5 6 \\\r\n"), expected);
+        let many = format!("f {}1 2 3", "\\\n".repeat(100_000));
+        assert_eq!(lines(&many), [(1, "f 1 2 3".to_string())]);
     }
 
     #[test]

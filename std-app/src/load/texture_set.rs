@@ -2,7 +2,7 @@
 //! clamped.
 
 use super::error::LoadError;
-use super::map::{Map, MapOptions};
+use super::map::{Channel, Map, MapOptions};
 use super::notes::Notes;
 use super::relief::{self, Relief};
 use super::texture::{self, Content};
@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 
 /// Number of the alpha channel.
 const ALPHA: u8 = 3;
+/// Luminance of linear sRGB (IEC 61966-2-1).
+const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// Longest side of a texture in pixels.
 const LONGEST_SIDE: u32 = 1 << 15;
 
@@ -23,7 +25,13 @@ const LONGEST_SIDE: u32 = 1 << 15;
 pub struct TextureSet {
     pictures: Vec<Picture>,
     by_file: HashMap<PathBuf, usize>,
+    /// Pictures of single channels of others.
+    derived: HashMap<(usize, Channel), usize>,
+    /// Bytes that derived pictures may take.
+    spare: usize,
     views: Vec<View>,
+    /// Choices of channels.
+    pub(super) notes: Notes,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +75,7 @@ impl TextureSet {
             }
             set.decode_batch(&batch, required, budget, notes)?;
         }
+        set.spare = budget.left();
         Ok(set)
     }
 
@@ -100,7 +109,12 @@ impl TextureSet {
 
     /// The picture of a map as colours; `None` if it was not decoded.
     pub(super) fn colour(&mut self, map: Option<&Map>) -> Option<TextureId> {
-        self.view(map?, Content::Colour)
+        let map = map?;
+        let id = self.view(map, Content::Colour)?;
+        if map.options.channel.is_some() {
+            self.notes.add(1, "`-imfchan` of a map of colours left out: it has all channels");
+        }
+        Some(id)
     }
 
     /// The picture of a map as numbers.
@@ -108,28 +122,80 @@ impl TextureSet {
         self.view(map?, Content::Data)
     }
 
+    /// The channel of a map of heights, by default the luminance.
+    pub(super) fn heights(&mut self, map: &Map) -> Option<TextureId> {
+        match self.existing(map, map.options.channel.unwrap_or(Channel::Luminance))? {
+            Channel::Component(0) => self.view(map, Content::Data),
+            channel => self.derived(map, channel),
+        }
+    }
+
     /// The channel of a scalar map, by default red.
     pub(super) fn scalar(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
         let map = map?;
-        self.channel(map, map.options.channel.unwrap_or(0))
+        self.channel(map, map.options.channel.unwrap_or(Channel::Component(0)))
     }
 
     /// The channel of an opacity map, by default alpha if there is one, else red.
     pub(super) fn opacity(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
         let map = map?;
-        let alpha = self.picture(map)?.has_alpha.then_some(ALPHA);
-        self.channel(map, map.options.channel.or(alpha).unwrap_or(0))
+        let default = if self.picture(map)?.has_alpha { ALPHA } else { 0 };
+        self.channel(map, map.options.channel.unwrap_or(Channel::Component(default)))
     }
 
-    fn channel(&mut self, map: &Map, channel: u8) -> Option<(TextureId, u8)> {
-        let picture = self.picture(map)?;
-        let content = match (&picture.samples, channel) {
-            (Samples::Floats { .. }, ALPHA) if picture.has_alpha => Content::Alpha,
+    fn channel(&mut self, map: &Map, channel: Channel) -> Option<(TextureId, u8)> {
+        let Channel::Component(component) = self.existing(map, channel)? else {
+            return Some((self.derived(map, Channel::Luminance)?, 0));
+        };
+        let content = match (&self.picture(map)?.samples, component) {
+            (Samples::Floats { .. }, ALPHA) => Content::Alpha,
             // Alpha of bytes is equal in both views; the view of the colour usually exists already.
             (Samples::Bytes(_), ALPHA) => Content::Colour,
             _ => Content::Data,
         };
-        Some((self.view(map, content)?, channel))
+        Some((self.view(map, content)?, component))
+    }
+
+    /// The channel, if the picture has it: luminance instead of an absent alpha, red instead of the luminance
+    /// of a grey picture.
+    fn existing(&mut self, map: &Map, channel: Channel) -> Option<Channel> {
+        let picture = self.picture(map)?;
+        let is_absent = channel == Channel::Component(ALPHA) && !picture.has_alpha;
+        let channel = if is_absent { Channel::Luminance } else { channel };
+        let is_grey = || colours(picture).all(|[r, g, b, _]| r == g && g == b);
+        let is_red = channel == Channel::Luminance && is_grey();
+        if is_absent {
+            self.notes.add(1, "`-imfchan m` of a picture without alpha: its luminance is used");
+        }
+        Some(if is_red { Channel::Component(0) } else { channel })
+    }
+
+    /// A view of one channel of the picture of a map in all channels; of its red one if memory is short.
+    fn derived(&mut self, map: &Map, channel: Channel) -> Option<TextureId> {
+        let source = *self.by_file.get(map.found.as_ref()?)?;
+        if !self.derived.contains_key(&(source, channel)) {
+            let picture = &self.pictures[source];
+            let Picture { width, height, .. } = *picture;
+            let Some(spare) = self.spare.checked_sub(width as usize * height as usize * size_of::<f32>())
+            else {
+                self.notes.add(1, "red is used instead of another channel of a map: memory is short");
+                return self.view(map, Content::Data);
+            };
+            let value = |[r, g, b, a]: [f32; 4]| match channel {
+                Channel::Component(component) => [r, g, b, a][usize::from(component & 3)],
+                Channel::Luminance => LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b,
+            };
+            let samples = Samples::Floats { rgb: Vec::new(), alpha: colours(picture).map(value).collect() };
+            self.spare = spare;
+            self.derived.insert((source, channel), self.pictures.len());
+            self.pictures.push(Picture { width, height, samples, has_alpha: true, notes: Vec::new() });
+        }
+        Some(self.view_of(self.derived[&(source, channel)], map, Content::Alpha))
+    }
+
+    /// Bytes of the pictures of single channels.
+    pub(super) fn derived_bytes(&self) -> usize {
+        self.derived.values().map(|&number| self.pictures[number].bytes()).sum()
     }
 
     /// The kind of relief in the picture of a map; `None` if it was not decoded.
@@ -171,6 +237,11 @@ impl TextureSet {
             (Samples::Floats { .. }, Content::Colour) => Content::Data,
             _ => content,
         };
+        Some(self.view_of(picture, map, content))
+    }
+
+    /// The view of a picture by the options of a map.
+    fn view_of(&mut self, picture: usize, map: &Map, content: Content) -> TextureId {
         let MapOptions { scale, offset, clamp, .. } = map.options;
         let [scale, offset] = [scale, offset].map(|uv| uv.map(|x| x as f32).into());
         let transform = TextureTransform { scale, offset };
@@ -180,7 +251,22 @@ impl TextureSet {
             self.views.push(view);
             self.views.len() - 1
         });
-        Some(TextureId(id as u32))
+        TextureId(id as u32)
+    }
+}
+
+/// Numbers of the texels of a prepared picture.
+fn colours(picture: &Picture) -> Box<dyn Iterator<Item = [f32; 4]> + '_> {
+    match &picture.samples {
+        Samples::Bytes(bytes) => {
+            let texel = |texel: &[u8; 4]| texel.map(|byte| f32::from(byte) / 255.0);
+            Box::new(bytes.as_chunks().0.iter().map(texel))
+        }
+        Samples::Floats { rgb, alpha } => {
+            let alpha = alpha.iter().copied().chain(core::iter::repeat(1.0));
+            Box::new(rgb.iter().zip(alpha).map(|(&[r, g, b], a)| [r, g, b, a]))
+        }
+        Samples::Words(_) => Box::new(core::iter::empty()),
     }
 }
 

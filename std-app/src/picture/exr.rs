@@ -2,6 +2,7 @@
 //! parts, any data window. Only blocks of the chosen part are decompressed.
 
 use super::layers::{self, Choice};
+use super::primaries::{Primaries, converted};
 use super::{FileError, Info, Kind, Picture, Samples, black, fail, pixels};
 use exr::block::UncompressedBlock;
 use exr::block::reader::{ChunksReader, Reader};
@@ -9,6 +10,7 @@ use exr::math::Vec2;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use exr::prelude::f16;
+use glam::DMat3;
 use std::io::Cursor;
 
 /// Most channels of a part.
@@ -27,6 +29,8 @@ struct File<'a> {
     /// Size of the display window.
     width: usize,
     height: usize,
+    /// Matrix of the colours to sRGB; `None` if they are of sRGB.
+    matrix: Option<DMat3>,
     notes: Vec<String>,
 }
 
@@ -53,7 +57,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
     let wanted = file.columns();
     let origin = file.origin();
     let in_parallel = file.blocks_at_once() > 1;
-    let File { reader, choice, notes, .. } = file;
+    let File { reader, choice, matrix, notes, .. } = file;
 
     let insert = |header: &Header, block: UncompressedBlock| {
         let Vec2(columns, rows) = block.index.pixel_size;
@@ -65,7 +69,8 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
                 let x = origin[0] + (block.index.pixel_position.x() + column) as i64;
                 let Some(x) = usize::try_from(x).ok().filter(|x| *x < width) else { continue };
                 let value = |channel: Column| channel.value(line, columns, column);
-                rgb[y * width + x] = wanted.colour.map(value);
+                let colour = wanted.colour.map(value);
+                rgb[y * width + x] = matrix.map_or(colour, |matrix| converted(&matrix, colour));
                 if let Some(channel) = wanted.alpha {
                     alpha[y * width + x] = value(channel);
                 }
@@ -115,8 +120,26 @@ fn open(bytes: &[u8]) -> Result<File<'_>, FileError> {
     let display = headers[choice.part].shared_attributes.display_window.size;
     let (width, height) = (display.x(), display.y());
     pixels(width, height)?;
-    let notes = layer.map(|layer| format!("its layer `{layer}` is read")).into_iter().collect();
-    Ok(File { reader, choice, width, height, notes })
+    let mut notes: Vec<String> =
+        layer.map(|layer| format!("its layer `{layer}` is read")).into_iter().collect();
+    let [r, g, b] = choice.colour;
+    let is_grey = r == g && g == b;
+    let matrix = if is_grey { None } else { matrix(&headers[choice.part], &mut notes) };
+    Ok(File { reader, choice, width, height, matrix, notes })
+}
+
+/// Matrix of the colours of a part to sRGB, by its chromaticities; `None` if they are of sRGB.
+fn matrix(header: &Header, notes: &mut Vec<String>) -> Option<DMat3> {
+    let given = header.shared_attributes.chromaticities?;
+    let given = [given.red, given.green, given.blue, given.white].map(|Vec2(x, y)| [x, y].map(f64::from));
+    let (matrix, what) = match Primaries::of(given.as_flattened()) {
+        Primaries::Srgb => return None,
+        Primaries::Other(matrix) => (Some(matrix), "are converted to sRGB"),
+        Primaries::Invalid => (None, "are taken as those of sRGB: these are no primaries"),
+    };
+    let numbers: Vec<String> = given.as_flattened().iter().map(|x| format!("{:.4}", x)).collect();
+    notes.push(format!("its colours of chromaticities {} {what}", numbers.join(" ")));
+    matrix
 }
 
 fn check(header: &Header) -> Result<(), FileError> {

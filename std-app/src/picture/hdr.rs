@@ -1,23 +1,10 @@
 //! Radiance pictures (Ward, "Radiance File Formats"): any program after `#?`, all eight orders of rows and
 //! columns, RGBE and XYZE, and the header lines that scale values.
 
+use super::primaries::{Primaries, converted, xyz_to_srgb};
 use super::rgbe::read_scanline;
 use super::{FileError, Info, Kind, Picture, Samples, black, fail, filled, pixels};
-
-/// Chromaticities of red, green, blue and white that count as sRGB: those of sRGB and of Radiance.
-const PRIMARIES: [[f64; 8]; 2] = [
-    [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290],
-    [0.64, 0.33, 0.29, 0.60, 0.15, 0.06, 0.3333, 0.3333],
-];
-/// Error of chromaticities: files have two to four digits.
-const PRIMARIES_TOLERANCE: f64 = 0.006;
-
-/// CIE XYZ to linear sRGB (IEC 61966-2-1).
-const TO_SRGB: [[f32; 3]; 3] = [
-    [3.240_97, -1.537_383, -0.498_611],
-    [-0.969_244, 1.875_968, 0.041_555],
-    [0.055_63, -0.203_977, 1.056_972],
-];
+use glam::DMat3;
 
 /// Most lines of a header.
 const MOST_LINES: usize = 1 << 16;
@@ -26,6 +13,8 @@ const MOST_LINES: usize = 1 << 16;
 struct Header<'a> {
     order: Order,
     is_xyz: bool,
+    /// Colours of RGBE.
+    primaries: Primaries,
     /// Factors that the values of each channel contain.
     applied: [f64; 3],
     notes: Vec<String>,
@@ -70,14 +59,15 @@ pub(super) fn info(bytes: &[u8]) -> Result<Info, FileError> {
 }
 
 pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
-    let Header { order, is_xyz, applied, notes, mut rest } = read_header(bytes)?;
+    let header = read_header(bytes)?;
+    let (matrix, Header { order, applied, notes, mut rest, .. }) = (header.matrix(), header);
     let (scanlines, length) = order.scanlines();
     let (mut rgb, alpha) = black(order.width * order.height, false)?;
     let mut line = filled(length, [0u8; 4])?;
     for scanline in 0..scanlines {
         read_scanline(&mut rest, &mut line)?;
         for (pixel, &rgbe) in line.iter().enumerate() {
-            rgb[order.index(scanline, pixel)] = colour(rgbe, applied, is_xyz);
+            rgb[order.index(scanline, pixel)] = colour(rgbe, applied, matrix.as_ref());
         }
     }
     let samples = Samples::Floats { rgb, alpha };
@@ -86,14 +76,14 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, FileError> {
 }
 
 /// Mantissas are not increased by half a step, as in most programs.
-fn colour([r, g, b, exponent]: [u8; 4], applied: [f64; 3], is_xyz: bool) -> [f32; 3] {
+fn colour([r, g, b, exponent]: [u8; 4], applied: [f64; 3], matrix: Option<&DMat3>) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];
     }
     let scale = 2f64.powi(i32::from(exponent) - 136);
     let mantissas = [r, g, b];
     let value: [f32; 3] = core::array::from_fn(|c| (f64::from(mantissas[c]) * scale / applied[c]) as f32);
-    if is_xyz { TO_SRGB.map(|row| row[0] * value[0] + row[1] * value[1] + row[2] * value[2]) } else { value }
+    matrix.map_or(value, |matrix| converted(matrix, value))
 }
 
 fn read_header(bytes: &[u8]) -> Result<Header<'_>, FileError> {
@@ -101,6 +91,7 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, FileError> {
     let mut header = Header {
         order: Order { width: 0, height: 0, columns: false, leftwards: false, upwards: false },
         is_xyz: false,
+        primaries: Primaries::Srgb,
         applied: [1.0; 3],
         notes: Vec::new(),
         rest,
@@ -124,6 +115,15 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, FileError> {
 }
 
 impl Header<'_> {
+    /// Matrix of the colours to sRGB; `None` if they are of sRGB.
+    fn matrix(&self) -> Option<DMat3> {
+        match self.primaries {
+            _ if self.is_xyz => Some(xyz_to_srgb()),
+            Primaries::Other(matrix) => Some(matrix),
+            Primaries::Srgb | Primaries::Invalid => None,
+        }
+    }
+
     /// Applies a line of the header.
     fn variable(&mut self, key: &str, value: &str) -> Result<(), FileError> {
         let numbers = || value.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
@@ -137,23 +137,24 @@ impl Header<'_> {
             "EXPOSURE" => self.apply(key, value, numbers().filter(|n| n.len() == 1)),
             "COLORCORR" => self.apply(key, value, numbers().filter(|n| n.len() == 3)),
             "PRIMARIES" => {
-                let is_near = |known: &[f64; 8], given: &[f64]| {
-                    given.len() == 8
-                        && known.iter().zip(given).all(|(a, b)| (a - b).abs() <= PRIMARIES_TOLERANCE)
+                self.primaries = numbers().map_or(Primaries::Invalid, |given| Primaries::of(&given));
+                let what = match self.primaries {
+                    Primaries::Srgb => return Ok(()),
+                    Primaries::Other(_) => "are converted to sRGB",
+                    Primaries::Invalid => "are taken as those of sRGB: these are no primaries",
                 };
-                let given = numbers().unwrap_or_default();
-                if !PRIMARIES.iter().any(|known| is_near(known, &given)) {
-                    let note = format!("its colours are taken as those of sRGB, not of PRIMARIES={value}");
-                    self.notes.push(note);
-                }
+                self.notes.push(format!("its colours of PRIMARIES={value} {what}"));
             }
             _ => {}
         }
         Ok(())
     }
 
-    /// Accumulates a factor that the pixels contain.
+    /// Accumulates a factor that the pixels contain. Some writers leave zeros there, which mean none.
     fn apply(&mut self, key: &str, value: &str, factors: Option<Vec<f64>>) {
+        if factors.iter().flatten().all(|factor| *factor == 0.0) && factors.is_some() {
+            return;
+        }
         let usable = factors.filter(|factors| factors.iter().all(|f| *f > 0.0 && f.is_finite()));
         let Some(factors) = usable else {
             self.notes.push(format!("{key}={value} is ignored: it is no factor"));

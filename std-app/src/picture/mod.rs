@@ -9,6 +9,7 @@ mod jpeg;
 mod kind;
 mod layers;
 mod pfm;
+mod primaries;
 mod raster;
 mod rgbe;
 mod tiff;

@@ -1,6 +1,6 @@
 //! PNG, BMP, TGA and WebP, decoded by the `image` crate.
 
-use super::{FileError, Info, Kind, Picture, Samples, black, filled, plausible};
+use super::{FileError, Info, Kind, Picture, Samples, fail, filled, plausible};
 use image::{ColorType, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
@@ -44,7 +44,7 @@ pub(super) fn decode(bytes: &[u8], info: &Info) -> Result<Picture, FileError> {
 }
 
 /// The pixels of a decoder.
-pub(super) fn read(decoder: impl ImageDecoder) -> Result<Picture, FileError> {
+fn read(decoder: impl ImageDecoder) -> Result<Picture, FileError> {
     let (width, height) = decoder.dimensions();
     let colour = decoder.color_type();
     let raw = usize::try_from(decoder.total_bytes()).map_err(FileError::new)?;
@@ -55,13 +55,12 @@ pub(super) fn read(decoder: impl ImageDecoder) -> Result<Picture, FileError> {
 }
 
 /// The decoder of a file, which has read the header.
-pub(super) fn open(bytes: &[u8], kind: Kind) -> Result<impl ImageDecoder + '_, FileError> {
+fn open(bytes: &[u8], kind: Kind) -> Result<impl ImageDecoder + '_, FileError> {
     let format = match kind {
         Kind::Png => ImageFormat::Png,
         Kind::Bmp => ImageFormat::Bmp,
         Kind::Tga => ImageFormat::Tga,
-        Kind::WebP => ImageFormat::WebP,
-        _ => ImageFormat::Tiff,
+        _ => ImageFormat::WebP,
     };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     // The caller checks the memory of the pixels.
@@ -81,10 +80,8 @@ fn png_scratch(bytes: &[u8]) -> usize {
 }
 
 /// Bytes of `pixels` as [`Samples`].
-pub(super) fn kept(colour: ColorType, pixels: usize) -> usize {
+fn kept(colour: ColorType, pixels: usize) -> usize {
     let of_pixel = match colour {
-        ColorType::Rgb32F => 12,
-        ColorType::Rgba32F => 16,
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => 8,
         _ => 4,
     };
@@ -104,20 +101,10 @@ fn samples(buffer: Vec<u8>, colour: ColorType) -> Result<Samples, FileError> {
     let channels = usize::from(colour.channel_count());
     let pixels = buffer.len() / usize::from(colour.bytes_per_pixel());
     let words = |bytes: &[u8]| u16::from_ne_bytes([bytes[0], bytes[1]]);
-    let floats = |bytes: &[u8]| f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     Ok(match usize::from(colour.bytes_per_pixel()) / channels {
         1 => Samples::Bytes(expanded(&buffer, channels, 1, pixels, |bytes| bytes[0], u8::MAX)?),
         2 => Samples::Words(expanded(&buffer, channels, 2, pixels, words, u16::MAX)?),
-        _ => {
-            let (mut rgb, mut alpha) = black(pixels, colour.has_alpha())?;
-            for (i, pixel) in buffer.chunks_exact(4 * channels).enumerate() {
-                rgb[i] = [0, 4, 8].map(|at| floats(&pixel[at..]));
-                if let Some(alpha) = alpha.get_mut(i) {
-                    *alpha = floats(&pixel[12..]);
-                }
-            }
-            Samples::Floats { rgb, alpha }
-        }
+        _ => fail!("{colour:?} is not supported"),
     })
 }
 

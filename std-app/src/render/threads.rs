@@ -372,7 +372,7 @@ mod tests {
         let corners = (0..side * side).map(|cell| cell / side * (side + 1) + cell % side);
         let halves = corners.flat_map(|a| [[a, a + 1, a + side + 2], [a, a + side + 2, a + side + 1]]);
         let triangles: Vec<Triangle> = halves.map(|vertices| Triangle { vertices, material: 0 }).collect();
-        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+        let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
 
         let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
         let mut arena = Arena::over(&mut lines);

@@ -2,7 +2,8 @@
 
 use super::*;
 use ::exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
-use ::exr::prelude::{IntegerBounds, LayerAttributes, WritableImage, f16};
+use ::exr::meta::attribute::Chromaticities;
+use ::exr::prelude::{IntegerBounds, LayerAttributes, Vec2, WritableImage, f16};
 
 fn layer(name: &str, channels: Vec<(&str, FlatSamples)>) -> Layer<AnyChannels<FlatSamples>> {
     let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
@@ -14,7 +15,18 @@ fn floats(values: [f32; 2]) -> FlatSamples {
 }
 
 fn file(layers: Vec<Layer<AnyChannels<FlatSamples>>>) -> Vec<u8> {
-    let attributes = Image::from_layer(layers[0].clone()).attributes;
+    with_chromaticities(layers, None)
+}
+
+/// A file with x and y of red, green, blue and white.
+fn with_chromaticities(layers: Vec<Layer<AnyChannels<FlatSamples>>>, given: Option<[f32; 8]>) -> Vec<u8> {
+    let mut attributes = Image::from_layer(layers[0].clone()).attributes;
+    attributes.chromaticities = given.map(|[rx, ry, gx, gy, bx, by, wx, wy]| Chromaticities {
+        red: Vec2(rx, ry),
+        green: Vec2(gx, gy),
+        blue: Vec2(bx, by),
+        white: Vec2(wx, wy),
+    });
     let mut bytes = Cursor::new(Vec::new());
     Image::from_layers(attributes, layers).write().to_buffered(&mut bytes).unwrap();
     bytes.into_inner()
@@ -78,4 +90,36 @@ fn truncated_files_are_refused() {
     for length in 0..bytes.len() {
         assert!(read_bytes(&bytes[..length]).is_err(), "{length}");
     }
+}
+
+#[test]
+fn chromaticities_are_converted_to_srgb() {
+    const AP1: [f32; 8] = [0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767];
+    let rgb = |given: Option<[f32; 8]>| {
+        let channels = vec![
+            ("R", floats([0.5, f32::INFINITY])),
+            ("G", floats([0.25, f32::INFINITY])),
+            ("B", floats([0.125, f32::INFINITY])),
+        ];
+        read(&with_chromaticities(vec![layer("", channels)], given))
+    };
+    // By the matrix of ACES (S-2014-004) with Bradford's adaptation.
+    let (colours, _, notes) = rgb(Some(AP1));
+    let [r, g, b] = colours[0];
+    assert!(
+        (r - 0.6867).abs() < 2e-4 && (g - 0.2188).abs() < 2e-4 && (b - 0.0999).abs() < 2e-4,
+        "{r} {g} {b}"
+    );
+    assert_eq!(colours[1], [f32::INFINITY; 3]);
+    assert!(notes[0].contains("0.7130 0.2930") && notes[0].contains("converted to sRGB"), "{notes:?}");
+    let srgb = [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329];
+    for same in [None, Some(srgb), Some([0.0; 8])] {
+        assert_eq!(rgb(same), (vec![[0.5, 0.25, 0.125], [f32::INFINITY; 3]], vec![], vec![]), "{same:?}");
+    }
+    let (colours, _, notes) = rgb(Some([0.3; 8]));
+    assert_eq!(colours[0], [0.5, 0.25, 0.125]);
+    assert!(notes[0].contains("no primaries"), "{notes:?}");
+    // A luminance has no primaries to convert.
+    let grey = with_chromaticities(vec![layer("", vec![("Y", floats([0.5, 2.0]))])], Some(AP1));
+    assert_eq!(read(&grey), (vec![[0.5; 3], [2.0; 3]], vec![], vec![]));
 }

@@ -43,7 +43,11 @@ fn exposure_and_colour_correction_are_divided_out() {
     assert_eq!(of(""), ([0.5, 0.25, 0.125], vec![]));
     assert_eq!(of("EXPOSURE=2\nSOFTWARE=x=y\nexposure = 0.25\n").0, [1.0, 0.5, 0.25]);
     assert_eq!(of("COLORCORR=2 4 1\nCOLORCORR= 0.5 1 1\nEXPOSURE=0.5\n").0, [1.0, 0.125, 0.25]);
-    for odd in ["EXPOSURE=0", "EXPOSURE=nan", "EXPOSURE=", "EXPOSURE=-1", "COLORCORR=1 0 1", "COLORCORR=2"] {
+    // Some writers leave zeros there.
+    for none in ["EXPOSURE=0", "EXPOSURE=0.0", "EXPOSURE= -0", "COLORCORR=0 0 0"] {
+        assert_eq!(of(&format!("{none}\n")), ([0.5, 0.25, 0.125], vec![]), "{none}");
+    }
+    for odd in ["EXPOSURE=nan", "EXPOSURE=", "EXPOSURE=-1", "COLORCORR=1 0 1", "COLORCORR=2"] {
         let (colour, notes) = of(&format!("{odd}\n"));
         assert!(colour == [0.5, 0.25, 0.125] && notes[0].starts_with(odd), "{odd}: {colour:?} {notes:?}");
     }
@@ -67,15 +71,31 @@ fn xyz_becomes_rgb() {
 }
 
 #[test]
-fn other_primaries_are_noted_and_other_formats_are_refused() {
+fn other_primaries_are_converted_and_other_formats_are_refused() {
     let header = |line: &str| read(&format!("#?x\n{line}\n\n-Y 1 +X 1\n"), &[[64, 32, 16, 129]]);
-    for same in
-        ["0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329", ".6400 .3300 .2900 .6000 .1500 .0600 .3333 .3333"]
-    {
-        assert_eq!(header(&format!("PRIMARIES={same}")).unwrap().notes, [""; 0]);
+    for same in [
+        "0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329",
+        ".6400 .3300 .2900 .6000 .1500 .0600 .3333 .3333",
+        "0 0 0 0 0 0 0 0",
+        "0.0000 0.0000 0.0000 0.0000 0.0000 0.0000 0.0000 0.0000",
+    ] {
+        let picture = header(&format!("PRIMARIES={same}")).unwrap();
+        assert_eq!((colours(&picture)[0], picture.notes), ([0.5, 0.25, 0.125], vec![]), "{same}");
     }
+    // BT.2020, by the matrix of ITU-R BT.2087.
     let wide = header("PRIMARIES= 0.708 0.292 0.17 0.797 0.131 0.046 0.3127 0.329").unwrap();
-    assert!(wide.notes[0].contains("taken as those of sRGB"), "{:?}", wide.notes);
+    let [r, g, b] = colours(&wide)[0];
+    let expected = [0.6742, 0.2199, 0.1056];
+    assert!(
+        [r - expected[0], g - expected[1], b - expected[2]].iter().all(|x| x.abs() < 2e-4),
+        "{r} {g} {b}"
+    );
+    assert!(wide.notes[0].contains("converted to sRGB"), "{:?}", wide.notes);
+    for odd in ["1 2 3", "0.64 0.33 0.3 0.6 0.15 0.06 0 0", "nan 0.33 0.3 0.6 0.15 0.06 0.3127 0.329", "?"] {
+        let picture = header(&format!("PRIMARIES={odd}")).unwrap();
+        assert_eq!(colours(&picture)[0], [0.5, 0.25, 0.125], "{odd}");
+        assert!(picture.notes[0].contains("no primaries"), "{:?}", picture.notes);
+    }
     for line in ["FORMAT=32-bit_rle_spectral", "FORMAT=ascii", "NCOMP=8"] {
         assert!(header(line).unwrap_err().to_string().contains("not supported"), "{line}");
     }

@@ -327,7 +327,7 @@ mod tests {
             .collect();
         let triangles: Vec<Triangle> =
             (0..3000).map(|i| Triangle { vertices: [3 * i, 3 * i + 1, 3 * i + 2], material: 0 }).collect();
-        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+        let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
         let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
         let mut arena = Arena::over(&mut lines);
         let bvh = Bvh::build(&mesh, &mut arena).unwrap();

@@ -275,7 +275,7 @@ mod tests {
             [0.0, 1.0, 0.0],
         ];
         let triangles = [[0, 1, 2], [3, 4, 5], [3, 5, 6]].map(|vertices| Triangle { vertices, material: 0 });
-        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+        let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
         let mut memory = lines(Bvh::footprint(triangles.len()));
         let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory)).unwrap();
 

@@ -71,13 +71,17 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// Nearest hit of `ray`.
     #[inline]
     pub(in crate::transport) fn nearest(&self, ray: &Ray) -> Hit {
-        self.bvh.nearest(self.level, ray)
+        let hit = self.bvh.nearest(self.level, ray);
+        if self.scene.mesh.overlaps.is_empty() { hit } else { self.scene.visible_hit(ray, hit) }
     }
 
     /// Nearest hits of `rays`.
     #[inline]
     pub(in crate::transport) fn nearest_batch(&self, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         self.bvh.nearest_batch(self.level, rays, coherence, hits);
+        if !self.scene.mesh.overlaps.is_empty() {
+            rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.scene.visible_hit(ray, *hit));
+        }
     }
 
     /// Surface point of `ray` at `hit`.

@@ -175,6 +175,7 @@ impl MaterialChange {
         replace!(diffuse specular emission tint shininess ior opacity roughness metallic illumination);
         material.maps.extend(change.maps);
         material.surely_glass |= change.surely_glass;
+        material.surely_reflects |= change.specular.is_some();
         material.two_sided = self.two_sided.unwrap_or(material.two_sided);
         if let (Some(map), Some(scale)) = (material.maps.get_mut(&MapKind::Bump), self.bump_scale) {
             map.options.bump_multiplier = Some(scale);

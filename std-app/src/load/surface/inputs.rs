@@ -115,11 +115,12 @@ impl Resolver<'_> {
             }
             (statement, _) => statement == "norm",
         };
-        let id = self.textures.data(Some(map))?;
         let multiplier = map.options.bump_multiplier;
         if is_normals {
+            let id = self.textures.data(Some(map))?;
             return Some(NormalMap::Tangent(id, multiplier.unwrap_or(1.0) as f32));
         }
+        let id = self.textures.heights(map)?;
         if multiplier.is_none() {
             let note = format!("heights of {name} have no `-bm`: they are multiplied by {DEFAULT_BUMP}");
             self.notes.add(1, note);

@@ -116,7 +116,7 @@ impl TestScene {
         }
         let transform = SceneTransform::fitting(bounds[0], bounds[1]);
         let positions: Vec<[f32; 3]> = self.positions.iter().map(|p| transform.point(*p).into()).collect();
-        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &self.triangles };
+        let mesh = Mesh { positions: &positions, triangles: &self.triangles, ..Mesh::default() };
         let up = if (self.look_at - self.eye).normalize().y.abs() > 0.9 { DVec3::Z } else { DVec3::Y };
         let sky =
             |radiance| Environment { radiance: Rgb::splat(radiance), map: None, to_map: Mat3::IDENTITY };

@@ -18,7 +18,7 @@ fn with_served(settings: &LobeSettings, surfaces: &[Surface], work: impl FnOnce(
     let materials: vec::Vec<_> =
         surfaces.iter().map(|&s| Material { surface: s, ..Material::GREY }).collect();
     let scene = Scene {
-        mesh: Mesh { positions: &[], normals: &[], texcoords: &[], triangles: &[] },
+        mesh: Mesh::default(),
         materials: &materials,
         textures: &[],
         lights: &[],

@@ -92,7 +92,7 @@ impl Irradiance {
             width: self.size[0],
             height: self.size[1],
             seed: self.seed,
-            max_depth: self.max_depth.or(loaded.settings.max_depth).unwrap_or(u32::MAX),
+            max_depth: self.max_depth.or(loaded.settings.max_depth.map(u32::from)).unwrap_or(u32::MAX),
         };
         let level = Level::detect();
         let mut memory = Pages::new(Bvh::footprint(scene.mesh.triangles.len()))?;
