@@ -37,14 +37,6 @@ impl FileError {
         })
     }
 
-    /// The error, for a file that was not written.
-    pub(crate) fn not_written(error: &io::Error) -> Self {
-        match error.kind() {
-            io::ErrorKind::NotFound => Self::new("cannot be written: its folder does not exist any more"),
-            _ => Self::new(format!("cannot be written: {}", Self::io(error))),
-        }
-    }
-
     /// The file, if it is known.
     pub fn file(&self) -> Option<&Path> {
         self.file.as_deref()

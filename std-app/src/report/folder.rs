@@ -35,7 +35,7 @@ pub fn check_folder(folder: &Path) -> Result<(), FileError> {
     }
     for (path, (_, marks)) in report_files(folder).iter().zip(FILES) {
         check_destination(path)?;
-        if !is_ours(path, marks).map_err(|error| FileError::not_written(&error).at(path))? {
+        if !is_ours(path, marks).map_err(|error| FileError::io(&error).at(path))? {
             let why = "is not part of a report and would be overwritten: choose another folder";
             return Err(FileError::new(why).at(path));
         }

@@ -34,7 +34,8 @@ impl Destination {
     /// # Errors
     /// A cycle of links, or an error of the system.
     pub fn of(path: &Path) -> io::Result<Self> {
-        let mut path = path.to_owned();
+        // Without the slash at its end, which a new file cannot have.
+        let mut path: PathBuf = path.components().collect();
         for _ in 0..MOST_LINKS {
             let kind = match fs::symlink_metadata(&path) {
                 Ok(data) if data.is_symlink() => {
@@ -63,6 +64,12 @@ impl Destination {
     /// True if it is written in place.
     pub fn is_stream(&self) -> bool {
         matches!(self.kind, Kind::Stream | Kind::Descriptor(_))
+    }
+
+    /// True if it is a file descriptor that the program has inherited, which is open.
+    #[cfg(unix)]
+    pub(crate) fn is_inherited(&self) -> bool {
+        matches!(self.kind, Kind::Descriptor(_))
     }
 
     /// True if it is a folder.

@@ -37,6 +37,20 @@ impl Patience<'_> {
     }
 }
 
+/// Checks that a pipe or device may be written, without opening it.
+pub(super) fn check(destination: &Destination) -> io::Result<()> {
+    #[cfg(unix)]
+    if !destination.is_inherited() {
+        use nix::unistd::{AccessFlags, access};
+        use std::os::unix::fs::FileTypeExt;
+        if std::fs::metadata(destination.path())?.file_type().is_socket() {
+            return Err(io::Error::other("it is a socket"));
+        }
+        access(destination.path(), AccessFlags::W_OK)?;
+    }
+    Ok(())
+}
+
 /// Writes `bytes` to a pipe or device.
 pub(super) fn write(destination: &Destination, bytes: Vec<u8>, patience: Patience) -> io::Result<()> {
     let longest = patience.since.elapsed().max(Patience::LEAST);
