@@ -10,6 +10,7 @@ mod fair_schedule;
 mod loading;
 #[cfg(target_os = "linux")]
 mod memory;
+mod names;
 mod outputs;
 mod parts;
 mod picture_files;

@@ -6,7 +6,7 @@ use super::read_picture;
 use clap::{Args, ValueEnum};
 use halflight::compare::{Comparison, Shown, compare, false_colours, working_bytes};
 use halflight::memory::Budget;
-use halflight::report::comparison_object;
+use halflight::report::{comparison_object, file_name};
 use halflight::save::Format;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -130,7 +130,7 @@ struct Saved<'a> {
 
 impl Saved<'_> {
     fn object(&self) -> Value {
-        json!({ "file": self.file, "difference": self.difference.name(), "scale": self.scale })
+        json!({ "file": file_name(self.file), "difference": self.difference.name(), "scale": self.scale })
     }
 
     fn text(&self) -> String {

@@ -86,14 +86,17 @@ fn read_picture(path: &Path, budget: &mut Budget) -> Result<Image, Failure> {
     Ok(image)
 }
 
-/// Prints help, version or wrong usage, which clap reports alike.
+/// Prints help, version or wrong usage, which clap reports alike. Usage repeats arguments: it has no colours.
 fn end_with(message: &clap::Error) -> ExitCode {
-    let is_usage = message.use_stderr();
-    let printed = message.print().and_then(|()| stdout().flush());
-    match check_output(printed).err().filter(|_| !is_usage) {
-        Some(failure) => print_message(failure),
-        None if !is_usage => return ExitCode::SUCCESS,
-        None => {}
+    if message.use_stderr() {
+        print_message(message.to_string().trim_end());
+        return ExitCode::from(2);
     }
-    ExitCode::from(2)
+    match check_output(message.print().and_then(|()| stdout().flush())) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            print_message(failure);
+            ExitCode::from(2)
+        }
+    }
 }

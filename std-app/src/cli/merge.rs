@@ -5,7 +5,7 @@ use super::outputs::{Outputs, Role};
 use super::summary;
 use clap::Args;
 use halflight::render::{self, Merged};
-use halflight::report::{dropped_object, error_object};
+use halflight::report::{dropped_object, error_object, file_name};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -54,7 +54,7 @@ impl Merge {
             "error": error_object(merged.error, merged.noise_and_blur, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
             "dropped": dropped_object(&counters.dropped, &merged.rejected_tiles, merged.empty_pixels),
-            "outputs": saved,
+            "outputs": saved.iter().map(|file| file_name(file)).collect::<Value>(),
         })
     }
 }

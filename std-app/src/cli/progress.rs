@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar on a terminal, otherwise a line every five seconds.
 
-use super::stdio::{print_message, print_note};
+use super::stdio::{escaped, print_message, print_note};
 use halflight::render::Progress;
 use halflight::report::quantity::readable_seconds;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -39,7 +39,7 @@ impl ProgressReporter {
         let done = left.map_or(0.0, |left| progress.seconds / (progress.seconds + left).max(1e-9));
         if let Some(bar) = &self.bar {
             bar.set_position((done * STEPS as f64) as u64);
-            bar.set_message(text);
+            bar.set_message(escaped(&text).into_owned());
         } else if progress.seconds >= self.last_line + INTERVAL {
             self.last_line = progress.seconds;
             print_message(format_args!("{:>3.0} %  {text}", 100.0 * done));

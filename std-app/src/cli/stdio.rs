@@ -1,9 +1,11 @@
 //! Standard output and standard error without the panics of `println!`. A failed write of results is a
-//! failure, unless the reader has closed the pipe. A failed write of notes is ignored.
+//! failure, unless the reader has closed the pipe. A failed write of notes is ignored. Names in files and of
+//! files may contain control characters, which would command the terminal: they are escaped here.
 
 use super::failure::Failure;
 use core::fmt::Display;
 use halflight::save::Identity;
+use std::borrow::Cow;
 use std::io::{self, Write, stderr, stdout};
 
 /// Prints a result on standard output.
@@ -11,7 +13,24 @@ use std::io::{self, Write, stderr, stdout};
 /// # Errors
 /// Results that were not written, except to a closed pipe.
 pub(super) fn print_result(text: &str) -> Result<(), Failure> {
-    check_output(writeln!(stdout(), "{text}").and_then(|()| stdout().flush()))
+    check_output(writeln!(stdout(), "{}", escaped(text)).and_then(|()| stdout().flush()))
+}
+
+/// `text` with control characters other than line ends as `\u001b`, which JSON has too.
+pub(super) fn escaped(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_control) {
+        return text.into();
+    }
+    let escape = |c: char| match is_control(c) {
+        true => format!("\\u{:04x}", u32::from(c)),
+        false => c.to_string(),
+    };
+    text.chars().map(escape).collect()
+}
+
+/// True for control characters other than line ends, and for those that change the direction of text.
+fn is_control(c: char) -> bool {
+    (c.is_control() && c != '\n') || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Failure of a write to standard output, except to a closed pipe.
@@ -35,10 +54,29 @@ fn is_closed(error: &io::Error) -> bool {
 /// Prints a line on standard error.
 pub(super) fn print_message(text: impl Display) {
     // A single write keeps lines of several threads whole.
-    let _ = stderr().write_all(format!("{text}\n").as_bytes());
+    let _ = stderr().write_all(format!("{}\n", escaped(&text.to_string())).as_bytes());
 }
 
 /// Prints a note on standard error.
 pub(super) fn print_note(text: impl Display) {
     print_message(format_args!("note: {text}"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_escaped_and_text_is_not() {
+        for (text, expected) in [
+            ("a\u{1b}]0;b\u{7}c\nd", "a\\u001b]0;b\\u0007c\nd"),
+            ("\r\t\u{7f}\u{9b}2J\u{202e}", "\\u000d\\u0009\\u007f\\u009b2J\\u202e"),
+            ("größe 木 12\u{202f}345 C:\\a", "größe 木 12\u{202f}345 C:\\a"),
+        ] {
+            assert_eq!(escaped(text), expected);
+        }
+        let name = "\u{9b}\u{7f}";
+        let object = serde_json::json!({ "name": name });
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&escaped(&object.to_string())).unwrap(), object);
+    }
 }

@@ -9,6 +9,7 @@ use crate::render::{
 use halflight_core::film::Dropped;
 use halflight_core::findings::{Decision, Findings, Value as FindingValue};
 use serde_json::{Map, Value, json};
+use std::path::Path;
 
 /// Object of a render.
 pub(super) fn run(run: &Run) -> Value {
@@ -55,11 +56,16 @@ pub(super) fn run(run: &Run) -> Value {
         "memory_peak": result.memory_peak,
         "findings": findings(&result.findings),
         "left_out": left_out_array(plan.left_out().chain(techniques_left_out(&result.findings))),
-        "outputs": run.outputs,
-        "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),
+        "outputs": run.outputs.iter().map(|file| file_name(file)).collect::<Value>(),
+        "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| file_name(&checkpoint.path)),
         "shard": (shard != Shard::WHOLE).then(|| [shard.index + 1, shard.count]),
         "made": made(run.provenance),
     })
+}
+
+/// Name of a file in an object: JSON has no bytes beyond Unicode.
+pub fn file_name(file: &Path) -> Value {
+    file.to_string_lossy().into()
 }
 
 /// Findings by topic: decision, reason and values.
