@@ -54,7 +54,7 @@ enum Command {
 
 /// Runs the program. Exit codes are a contract (docs/cli.md).
 fn main() -> ExitCode {
-    interrupt::block_file_size_signal();
+    interrupt::block_signals();
     panic::set_hook(Box::new(|panic| print_message(format_args!("internal error of halflight: {panic}"))));
     let command = match Cli::try_parse() {
         Ok(cli) => cli.command,
