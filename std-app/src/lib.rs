@@ -19,6 +19,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bench;
+mod cgroup;
 pub mod compare;
 mod file_error;
 pub mod load;

@@ -1,6 +1,7 @@
 //! The memory budget: a limit that holds from the first byte read. Every reader states its memory before it
 //! allocates.
 
+use crate::cgroup;
 use crate::report::quantity::readable_bytes;
 use halflight_core::memory::{ALIGNMENT, Footprint, Line, OutOfMemory};
 use std::fs::File;
@@ -121,14 +122,15 @@ pub fn read_file(path: &Path, most: usize) -> io::Result<Vec<u8>> {
     }
 }
 
-/// The default share of RAM, cgroup limit or `ulimit -v`, whichever is smallest, in bytes.
+/// The default share of RAM, limits of control groups, `ulimit -v` or `ulimit -d`, whichever is smallest, in
+/// bytes.
 fn default_limit() -> usize {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let limits = [
         field(&read("/proc/meminfo"), "MemTotal:", 1024),
-        field(&read("/sys/fs/cgroup/memory.max"), "", 1),
-        field(&read("/sys/fs/cgroup/memory/memory.limit_in_bytes"), "", 1),
+        cgroup::memory_limit(),
         field(&read("/proc/self/limits"), "Max address space", 1),
+        field(&read("/proc/self/limits"), "Max data size", 1),
     ];
     let least = limits.into_iter().flatten().filter(|bytes| *bytes > 0).min().unwrap_or(UNKNOWN);
     least / 100 * DEFAULT_PERCENT
