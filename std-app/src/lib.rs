@@ -26,6 +26,7 @@ pub mod load;
 pub mod memory;
 mod pages;
 pub mod picture;
+pub mod pool;
 pub mod render;
 pub mod report;
 pub mod save;

@@ -17,4 +17,6 @@ mod picture_files;
 mod pictures;
 #[cfg(unix)]
 mod pipes;
+#[cfg(target_os = "linux")]
+mod process;
 mod support;

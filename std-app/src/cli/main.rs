@@ -25,6 +25,7 @@ mod values;
 use clap::{Parser, Subcommand};
 use failure::Failure;
 use halflight::memory::Budget;
+use halflight::pool::in_pool;
 use halflight::save::{self, Image};
 use std::io::{Write, stdout};
 use std::panic;
@@ -52,6 +53,30 @@ enum Command {
     Study(study::Study),
 }
 
+impl Command {
+    /// Number of threads; `None`: all of the machine.
+    fn threads(&self) -> Option<usize> {
+        match self {
+            Command::Render(command) => command.threads(),
+            Command::Race(command) => command.threads(),
+            _ => None,
+        }
+    }
+
+    fn run(&self) -> Result<ExitCode, Failure> {
+        match self {
+            Command::Render(command) => command.run(),
+            Command::Compare(command) => command.run(),
+            Command::Merge(command) => command.run(),
+            Command::Race(command) => command.run(),
+            Command::Info(command) => command.run(),
+            Command::Bench(command) => command.run(),
+            Command::Stability(command) => command.run(),
+            Command::Study(command) => command.run(),
+        }
+    }
+}
+
 /// Runs the program. Exit codes are a contract (docs/cli.md).
 fn main() -> ExitCode {
     interrupt::block_signals();
@@ -60,17 +85,13 @@ fn main() -> ExitCode {
         Ok(cli) => cli.command,
         Err(message) => return end_with(&message),
     };
-    let outcome = panic::catch_unwind(panic::AssertUnwindSafe(|| match command {
-        Command::Render(command) => command.run(),
-        Command::Compare(command) => command.run(),
-        Command::Merge(command) => command.run(),
-        Command::Race(command) => command.run(),
-        Command::Info(command) => command.run(),
-        Command::Bench(command) => command.run(),
-        Command::Stability(command) => command.run(),
-        Command::Study(command) => command.run(),
-    }));
-    match outcome {
+    let run = || {
+        in_pool(command.threads(), || command.run()).unwrap_or_else(|error| {
+            Err(Failure::new(format!("no thread could be started: {error}"))
+                .advice("raise the limit of processes: ulimit -u, or that of the control group"))
+        })
+    };
+    match panic::catch_unwind(panic::AssertUnwindSafe(run)) {
         Ok(Ok(code)) => return code,
         Ok(Err(failure)) => print_message(failure),
         Err(_) => print_message("  help: please report it, with the command and the scene"),

@@ -42,6 +42,11 @@ pub(super) struct PictureArgs {
 }
 
 impl PictureArgs {
+    /// Number of threads; `None`: all of the machine.
+    pub(super) fn threads(&self) -> Option<usize> {
+        self.threads.map(|threads| threads as usize)
+    }
+
     /// File of the reference picture.
     pub(super) fn reference_file(&self) -> Option<&Path> {
         self.reference.as_deref()

@@ -11,13 +11,16 @@ use clap::Args;
 use core::sync::atomic::Ordering;
 use halflight::compare::{Comparison, compare};
 use halflight::load;
-use halflight::render::{self, FairSchedule, Progress, RenderResult, Settings, Stop};
+use halflight::pool::{ThreadPoolBuildError, in_pool};
+use halflight::render::{self, FairSchedule, Progress, RenderError, RenderResult, Settings, Stop, Turn};
 use halflight::report::{self, Provenance, Run, quantity::readable_seconds};
 use halflight_core::scene::Scene;
+use std::io;
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
+use std::thread::{self, ScopedJoinHandle};
 use std::time::Instant;
 
 /// Compare the error of several methods against run time
@@ -57,6 +60,11 @@ struct Done {
 }
 
 impl Race {
+    /// Number of threads; `None`: all of the machine.
+    pub(super) fn threads(&self) -> Option<usize> {
+        self.picture.threads()
+    }
+
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         self.check_names()?;
         let mut outputs = Outputs::new(self.json);
@@ -109,8 +117,7 @@ impl Race {
     fn renders(&self, scene: &Scene, settings: &[Settings]) -> Result<Vec<Done>, Failure> {
         let schedule = FairSchedule::new(settings.len());
         let reporter = Mutex::new(ProgressReporter::new());
-        let render = |index: usize| {
-            let turn = schedule.join(index);
+        let render = |index: usize, turn: &Turn| {
             let progress = &mut |progress: &Progress| {
                 let mut reporter = reporter.lock().unwrap_or_else(PoisonError::into_inner);
                 reporter.report(&self.methods[index].name, progress);
@@ -119,13 +126,25 @@ impl Race {
             };
             render::render(scene, &settings[index], progress, &INTERRUPT)
         };
-        let results: Vec<_> = std::thread::scope(|scope| {
-            let started: Vec<_> =
-                (0..settings.len()).map(|index| scope.spawn(move || render(index))).collect();
-            started
-                .into_iter()
-                .map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
-                .collect()
+        let run = |index: usize| {
+            let turn = schedule.join(index);
+            let refused = |error: ThreadPoolBuildError| Err(RenderError::Threads(error.to_string()));
+            in_pool(self.threads(), || render(index, &turn)).unwrap_or_else(refused)
+        };
+        let run = &run;
+        let results: Vec<_> = thread::scope(|scope| {
+            let spawn = |index| thread::Builder::new().spawn_scoped(scope, move || run(index));
+            let started: Vec<_> = (0..settings.len()).map(spawn).collect();
+            // The others wait for the turn of a render without a thread.
+            for (index, _) in started.iter().enumerate().filter(|(_, started)| started.is_err()) {
+                INTERRUPT.store(true, Ordering::Relaxed);
+                drop(schedule.join(index));
+            }
+            let end = |started: io::Result<ScopedJoinHandle<_>>| match started {
+                Ok(thread) => thread.join().unwrap_or_else(|panic| resume_unwind(panic)),
+                Err(error) => Err(RenderError::Threads(error.to_string())),
+            };
+            started.into_iter().map(end).collect()
         });
         reporter.into_inner().unwrap_or_else(PoisonError::into_inner).end();
         let done = results.into_iter().zip(settings).map(|(result, settings)| {

@@ -81,6 +81,11 @@ pub(super) struct Render {
 const SURVEY_POINTS: u32 = 1000;
 
 impl Render {
+    /// Number of threads; `None`: all of the machine.
+    pub(super) fn threads(&self) -> Option<usize> {
+        self.picture.threads()
+    }
+
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         let start = Instant::now();
         let (role, pictures) = self.pictures();

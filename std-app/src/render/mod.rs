@@ -98,7 +98,8 @@ pub struct Settings {
     /// True if the environment is sampled by visibility tables, which a prepass learns; `None`: as the
     /// prepass decides.
     pub environment_visibility: Option<bool>,
-    /// Number of threads; `None`: all of the machine.
+    /// Number of threads; `None`: all of the machine. A render on a thread of a pool with at most so many
+    /// threads runs on that pool.
     pub threads: Option<usize>,
     /// Memory limit in bytes for the scene and all structures; `None`: no limit.
     pub memory: Option<usize>,

@@ -3,14 +3,15 @@
 
 use super::RenderError;
 use super::deadline::{Deadline, End};
+use crate::pool;
 use halflight_core::Level;
 use halflight_core::bvh::{Bvh, ForkJoin};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::method::{Executor, Passed, RenderState, Round, Worker};
 use halflight_core::scene::Mesh;
 use halflight_core::transport::Counters;
+use rayon::ThreadPool;
 use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -25,12 +26,14 @@ pub(super) struct Workers<'w> {
 }
 
 impl<'w> Workers<'w> {
-    /// A pool of `threads` threads; `None`: all of the machine.
+    /// The pool of this thread if it has at most `threads` threads, otherwise a new one; `None`: all of the
+    /// machine.
     pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
-        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-        let phases = Mutex::default();
-        pool.map(|pool| Self { fork: Fork(pool), deadline: Deadline::default(), phases })
-            .map_err(|error| RenderError::Threads(error.to_string()))
+        let is_here = rayon::current_thread_index().is_some()
+            && threads.is_none_or(|most| rayon::current_num_threads() <= most);
+        let pool = if is_here { Ok(None) } else { pool::start(threads).map(Some) };
+        let pool = pool.map_err(|error| RenderError::Threads(error.to_string()))?;
+        Ok(Self { fork: Fork(pool), deadline: Deadline::default(), phases: Mutex::default() })
     }
 
     /// A pool whose passes end at `deadline`.
@@ -55,12 +58,15 @@ impl<'w> Workers<'w> {
 
     /// Number of threads.
     pub(super) fn count(&self) -> usize {
-        self.fork.0.current_num_threads()
+        self.fork.0.as_ref().map_or_else(rayon::current_num_threads, ThreadPool::current_num_threads)
     }
 
     /// Runs `work` on the pool, whose threads take the parts of its parallel iterators.
     pub(super) fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
-        self.fork.0.install(work)
+        match &self.fork.0 {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
     }
 
     /// Builds the BVH of `mesh` on all threads.
@@ -92,12 +98,15 @@ impl<'w> Workers<'w> {
     }
 }
 
-/// Forks on the threads of a pool.
-pub(super) struct Fork(ThreadPool);
+/// Forks on the threads of a pool, or of the pool of this thread.
+pub(super) struct Fork(Option<ThreadPool>);
 
 impl ForkJoin for Fork {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
-        self.0.join(a, b);
+        match &self.0 {
+            Some(pool) => pool.join(a, b),
+            None => rayon::join(a, b),
+        };
     }
 }
 

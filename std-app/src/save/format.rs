@@ -101,6 +101,8 @@ fn encode_exr(picture: &Image) -> Result<Vec<u8>, FileError> {
     let mut bytes = Vec::new();
     exr::image::Image::from_encoded_channels(size, encoding, SpecificChannels::rgb(pixel))
         .write()
+        // In parallel `exr` starts threads of its own.
+        .non_parallel()
         .to_buffered(Cursor::new(&mut bytes))
         .map_err(FileError::new)?;
     Ok(bytes)
