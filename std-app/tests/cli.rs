@@ -240,6 +240,9 @@ fn a_reference_is_compared_with_and_its_size_is_checked_first() {
     assert_eq!((&last["spp"], &last["relmse"]), (&object["spp"], &object["error"]["estimate"]["relmse"]));
     assert_eq!(last["reference"]["mse"], object["error"]["mse"]);
     assert!(history[0]["reference"]["flip"].is_number());
+    write(&folder.path("nan.pfm"), &Image { width: 8, height: 8, pixels: vec![[f32::NAN; 3]; 64] }).unwrap();
+    let render = "render scene.obj -o a.exr --size 8x8 --spp 4 --reference nan.pfm --report out --json";
+    assert!(folder.object(render)["error"]["relmse"].is_null(), "there is nothing to compare with");
     let said = folder.refused("render scene.obj -o b.exr --size 9x9 --reference r.exr");
     assert!(said.contains("--size 16x16") && !folder.path("b.exr").exists(), "{said}");
 }
@@ -268,6 +271,14 @@ fn compare_prints_known_values() {
     write(&folder.path("nan.pfm"), &flat(f32::NAN)).unwrap();
     let text = String::from_utf8(folder.run("compare nan.pfm b.pfm").stdout).unwrap();
     assert!(text.contains("2 pixels of the picture are infinite or not a number"), "{text}");
+    assert!(text.contains("relMSE NaN"), "{text}");
+    for pair in ["nan.pfm b.pfm", "b.pfm nan.pfm", "nan.pfm nan.pfm"] {
+        let object = folder.object(&format!("compare {pair} --json"));
+        assert!(
+            ["relmse", "mse", "rmse", "flip", "mean"].iter().all(|key| object[key].is_null()),
+            "{object}"
+        );
+    }
 }
 
 #[test]

@@ -21,7 +21,7 @@ pub struct Difference {
     pub mean: f64,
     /// Mean of R, the m of relMSE.
     pub reference_mean: f64,
-    /// Number of pixels compared. All means are 0 if there are none.
+    /// Number of pixels compared. All means are NaN if there are none.
     pub pixels: u64,
     /// Number of pixels skipped because the picture is not finite.
     pub non_finite: u64,
@@ -46,7 +46,7 @@ impl Difference {
                 sum.reference_mean += channels(r).iter().sum::<f64>();
             }
         }
-        let values = sum.pixels.max(1) as f64 * 3.0;
+        let values = sum.pixels as f64 * 3.0;
         sum.mean /= values;
         sum.reference_mean /= values;
 
@@ -130,6 +130,15 @@ mod tests {
     fn black_and_empty_references() {
         assert_eq!(between(&[Rgb::ZERO], &[Rgb::ZERO]).relmse, 0.0);
         assert_eq!(between(&[Rgb::ONE], &[Rgb::ZERO]).relmse, f64::INFINITY);
-        assert_eq!(between(&[], &[]), Difference::default());
+    }
+
+    #[test]
+    fn pictures_without_a_finite_pixel_have_no_error() {
+        let (nan, grey) = ([Rgb::splat(f32::NAN), Rgb::splat(f32::INFINITY)], [Rgb::ONE; 2]);
+        for (image, reference) in [(&nan[..], &grey[..]), (&grey, &nan), (&nan, &nan), (&[], &[])] {
+            let Difference { relmse, mse, mean, reference_mean, pixels, .. } = between(image, reference);
+            assert_eq!(pixels, 0);
+            assert!([relmse, mse, mean, reference_mean].iter().all(|value| value.is_nan()));
+        }
     }
 }

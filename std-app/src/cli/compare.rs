@@ -17,7 +17,7 @@ use std::process::ExitCode;
 /// relMSE is the mean over pixels and channels of (A - B)^2 / (B^2 + 0.01 m^2), with the mean m of B. relMSE,
 /// MSE and RMSE are errors of linear radiance; PNG and JPEG are decoded from sRGB. FLIP is the LDR-FLIP error
 /// (Andersson et al. 2020) of the sRGB pictures at 67 pixels per degree. Infinite and NaN pixels are left out
-/// of the linear errors.
+/// of the linear errors; without any other pixel all errors are NaN.
 #[derive(Args)]
 pub(super) struct Compare {
     /// Picture: EXR, HDR, PFM, PNG, JPEG, TIFF, WebP, BMP or TGA
@@ -144,7 +144,7 @@ impl Saved<'_> {
 pub(super) fn text(comparison: &Comparison) -> String {
     let linear = &comparison.linear;
     let ratio = match linear.reference_mean {
-        0.0 => String::new(),
+        reference if reference == 0.0 || reference.is_nan() => String::new(),
         reference => format!(" ({:+.3} %)", (linear.mean / reference - 1.0) * 100.0),
     };
     let mut text = format!(

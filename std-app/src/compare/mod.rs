@@ -17,7 +17,7 @@ use halflight_core::estimate::Difference;
 pub struct Comparison {
     /// MSE, relMSE, means, and the number of pixels that are not finite.
     pub linear: Difference,
-    /// Mean of the LDR-FLIP map: 0 is no visible difference, 1 the largest.
+    /// Mean of the LDR-FLIP map: 0 is no visible difference, 1 the largest; NaN if no pixel is finite.
     pub flip: f64,
     /// Pixels in a row.
     pub width: u32,
@@ -60,11 +60,17 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, SizeMisma
         return Err(SizeMismatch { image: size(image), reference: size(reference) });
     }
     let flip_map = flip(image, reference);
+    let linear = Difference::between(image.colours(), reference.colours());
     Ok(Comparison {
-        linear: Difference::between(image.colours(), reference.colours()),
-        flip: flip::mean(&flip_map),
+        linear,
+        flip: visible(&linear, flip::mean(&flip_map)),
         width: image.width,
         height: image.height,
         flip_map,
     })
+}
+
+/// The mean FLIP error `flip`; NaN if no pixel of both pictures is finite, since there is nothing to compare.
+pub(crate) fn visible(linear: &Difference, flip: f64) -> f64 {
+    if linear.pixels == 0 { f64::NAN } else { flip }
 }

@@ -2,7 +2,7 @@
 //! it pauses the clock.
 
 use super::ErrorEstimate;
-use crate::compare::Observer;
+use crate::compare::{Observer, visible};
 use crate::save::Image;
 use core::time::Duration;
 use halflight_core::estimate::Difference;
@@ -46,7 +46,7 @@ impl<'a> Reference<'a> {
     /// Error of `image`, which has the size of the reference.
     pub(super) fn compare(&self, image: &Image) -> Against {
         let linear = Difference::between(image.colours(), self.image.colours());
-        Against { linear, flip: self.observer.mean(image) }
+        Against { linear, flip: visible(&linear, self.observer.mean(image)) }
     }
 }
 

@@ -227,7 +227,7 @@ fn round(round: &Round) -> Value {
     object
 }
 
-/// Object of `compare --json`. Infinite errors are `null`, because JSON has no infinity.
+/// Object of `compare --json`. Errors that are infinite or NaN are `null`, which JSON lacks.
 pub fn comparison_object(comparison: &Comparison) -> Value {
     let linear = &comparison.linear;
     json!({
