@@ -187,3 +187,18 @@ fn a_scene_file_finds_files_as_an_mtl_does() {
     assert_eq!(scene.repairs.len(), 2, "{:?}", scene.repairs);
     assert!(scene.repairs[0].contains("wood.bmp is used") && scene.repairs[0].contains("s.toml:4"));
 }
+
+#[test]
+fn a_file_that_is_placed_again_keeps_its_materials_and_notes() {
+    let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    let mtl = "newmtl red\nKd 1 0 0\nglow 3\n";
+    let mesh = "[[mesh]]\nfile = \"a.obj\"\ntranslate = ";
+    let toml = format!("{mesh}[0, 0, 0]\n{mesh}[2, 0, 0]\n{mesh}[4, 0, 0]\n");
+    let files = [("a.obj", obj), ("a.mtl", mtl), ("a.toml", &toml)];
+    let files = files.map(|(name, text)| (name, text.as_bytes()));
+    let scene = Files::new(&files).load("a.toml").unwrap();
+    assert_eq!((scene.triangles.len(), scene.materials.len()), (3, 2));
+    assert!(scene.triangles.iter().all(|triangle| triangle.material == scene.triangles[0].material));
+    let [note] = &scene.repairs[..] else { panic!("{:?}", scene.repairs) };
+    assert!(note.contains("`glow` is not supported") && !note.contains("times"), "{note}");
+}

@@ -50,6 +50,7 @@ use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use texcoords::Texcoords;
 
 /// Options of a load.
@@ -107,6 +108,8 @@ struct SceneBuilder {
     objs: Vec<obj::Obj>,
     /// Index into `objs` of each OBJ file; a file is read once, however often it is placed.
     obj_numbers: HashMap<PathBuf, usize>,
+    /// Materials of each OBJ by its libraries, which are read once too.
+    own_materials: HashMap<usize, Rc<[u32]>>,
     materials: Vec<MtlMaterial>,
     /// Index of each material by OBJ file (`None`: the scene file) and name.
     material_numbers: HashMap<(Option<usize>, Name), u32>,
@@ -122,7 +125,7 @@ struct PlacedMesh {
     placement: Placement,
     /// Index into the materials of the scene for each material of the OBJ, and last for faces without
     /// material.
-    materials: Vec<u32>,
+    materials: Rc<[u32]>,
 }
 
 impl SceneBuilder {
@@ -132,6 +135,7 @@ impl SceneBuilder {
             meshes: Vec::new(),
             objs: Vec::new(),
             obj_numbers: HashMap::new(),
+            own_materials: HashMap::new(),
             materials: Vec::new(),
             material_numbers: HashMap::new(),
             overrides: BTreeMap::new(),
@@ -160,19 +164,32 @@ impl SceneBuilder {
                 self.objs.len() - 1
             }
         };
-        let names = self.objs[number].materials.clone();
-        let mut materials: Vec<u32> = match material {
-            Some(material) => vec![self.material(None, material.into(), None); names.len()],
-            None => {
-                let Self { lookup, budget, notes, .. } = self;
-                let sources = Sources { lookup, budget, notes };
-                let library = Library::read(path, &self.objs[number].libraries, &names, sources);
-                names.iter().map(|name| self.file_material(number, name, &library, path)).collect()
+        let materials = match material {
+            Some(material) => {
+                let material = self.material(None, material.into(), None);
+                vec![material; self.objs[number].materials.len() + 1].into()
             }
+            None => self.own_materials(number, path),
         };
-        materials.push(self.material(None, material.unwrap_or_default().into(), None));
         self.meshes.push(PlacedMesh { obj: number, placement, materials });
         Ok(())
+    }
+
+    /// Materials of an OBJ file by its libraries.
+    fn own_materials(&mut self, obj: usize, path: &Path) -> Rc<[u32]> {
+        if let Some(known) = self.own_materials.get(&obj) {
+            return known.clone();
+        }
+        let names = self.objs[obj].materials.clone();
+        let Self { lookup, budget, notes, .. } = self;
+        let library =
+            Library::read(path, &self.objs[obj].libraries, &names, Sources { lookup, budget, notes });
+        let mut materials: Vec<u32> =
+            names.iter().map(|name| self.file_material(obj, name, &library, path)).collect();
+        materials.push(self.material(None, "".into(), None));
+        let materials: Rc<[u32]> = materials.into();
+        self.own_materials.insert(obj, materials.clone());
+        materials
     }
 
     /// The material of the operand of a `usemtl`.

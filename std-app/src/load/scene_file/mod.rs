@@ -106,6 +106,8 @@ pub fn parse(text: &str, file: &Path) -> Result<SceneFile, LoadError> {
 /// Text of a scene file, for errors with line and column, and the files that it names.
 struct Source<'a> {
     text: &'a str,
+    /// Byte at which each line starts.
+    lines: Vec<usize>,
     file: &'a Path,
     lookup: RefCell<Lookup>,
     notes: RefCell<Notes>,
@@ -114,14 +116,20 @@ struct Source<'a> {
 impl<'a> Source<'a> {
     fn new(text: &'a str, file: &'a Path) -> Self {
         let notes = Notes::of(file.display().to_string());
-        Self { text, file, lookup: RefCell::default(), notes: notes.into() }
+        let lines = [0].into_iter().chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Self { text, lines, file, lookup: RefCell::default(), notes: notes.into() }
     }
 
     fn error(&self, span: Range<usize>, problem: impl Into<String>, help: impl Into<String>) -> LoadError {
-        let before = self.text.get(..span.start).unwrap_or(self.text);
-        let line = before.matches('\n').count() as u32 + 1;
-        let column = before.rsplit('\n').next().unwrap_or_default().chars().count() as u32 + 1;
-        LoadError { column, ..LoadError::at(self.file, line, problem, help) }
+        let line = self.line(&span);
+        let before = self.text.get(self.lines[line - 1]..span.start).unwrap_or_default();
+        let column = before.chars().count() as u32 + 1;
+        LoadError { column, ..LoadError::at(self.file, line as u32, problem, help) }
+    }
+
+    /// Line of an entry, from 1.
+    fn line(&self, span: &Range<usize>) -> usize {
+        self.lines.partition_point(|start| *start <= span.start).max(1)
     }
 
     /// The file at a path of the scene file.
@@ -131,8 +139,9 @@ impl<'a> Source<'a> {
         let found = self.lookup.borrow_mut().locate(&[name.as_bytes()], &[directory]);
         let note = found.note("file", name.as_bytes());
         if let Some(file) = found.file() {
-            let line = self.error(path.span(), "", "").line;
-            note.into_iter().for_each(|note| self.notes.borrow_mut().at(line, note));
+            if let Some(note) = note {
+                self.notes.borrow_mut().at(self.line(&path.span()) as u32, note);
+            }
             return Ok(file.into());
         }
         let problem = match found {
