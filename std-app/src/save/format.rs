@@ -114,10 +114,26 @@ const LARGEST_RGBE: f32 = 255.0 / 256.0 * 1.701_411_8e38;
 fn encode_hdr(picture: &Image) -> Result<Vec<u8>, FileError> {
     let storable = |value: f32| value.clamp(0.0, LARGEST_RGBE).max(0.0);
     let pixels: Vec<Rgb<f32>> = picture.pixels.iter().map(|pixel| Rgb(pixel.map(storable))).collect();
+    let (width, height) = (picture.width as usize, picture.height as usize);
+    if width != LONG_SCANLINE {
+        return encode_scanlines(&pixels, [width, height]);
+    }
+    // Scanlines of one pixel are flat, and so is the picture of another size.
+    let bytes = encode_scanlines(&pixels, [1, pixels.len()])?;
+    let narrow = format!("-Y {} +X 1\n", pixels.len());
+    let Some(at) = bytes.windows(narrow.len()).position(|window| window == narrow.as_bytes()) else {
+        fail!("the picture cannot be encoded");
+    };
+    let (header, rest) = (&bytes[..at], &bytes[at + narrow.len()..]);
+    Ok([header, format!("-Y {height} +X {width}\n").as_bytes(), rest].concat())
+}
+
+/// Length of scanlines that `image` encodes in runs although only shorter ones may be.
+const LONG_SCANLINE: usize = 1 << 15;
+
+fn encode_scanlines(pixels: &[Rgb<f32>], [width, height]: [usize; 2]) -> Result<Vec<u8>, FileError> {
     let mut bytes = Vec::new();
-    HdrEncoder::new(&mut bytes)
-        .encode(&pixels, picture.width as usize, picture.height as usize)
-        .map_err(FileError::new)?;
+    HdrEncoder::new(&mut bytes).encode(pixels, width, height).map_err(FileError::new)?;
     Ok(bytes)
 }
 
@@ -145,6 +161,20 @@ mod tests {
         for byte in 0..=255u8 {
             let display = f32::from(byte) / 255.0;
             assert!((to_srgb(from_srgb(display)) - display).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn hdr_scanlines_of_every_length_can_be_read() {
+        for width in [1, 2, 7, 8, 9, 32_767, 32_768, 32_769, 65_536] {
+            let pixel = |i: u32| [(1 + i % 97) as f32, 1.0, if i % 5 < 3 { 0.25 } else { 64.0 }];
+            let picture = Image { width, height: 3, pixels: (0..3 * width).map(pixel).collect() };
+            let bytes = encode(&picture, Format::Hdr).unwrap();
+            let read = crate::picture::decode(&bytes, Path::new("a.hdr"), 1 << 30).map(Image::from).unwrap();
+            assert_eq!((read.width, read.height), (width, 3));
+            let pairs = picture.pixels.iter().flatten().zip(read.pixels.iter().flatten());
+            // Eight bits of mantissa of the largest channel.
+            assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() <= 0.5), "{width}");
         }
     }
 }
