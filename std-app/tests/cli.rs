@@ -136,6 +136,20 @@ fn a_render_without_a_stop_rule_ends_by_its_error_and_says_so() {
 }
 
 #[test]
+fn a_scene_without_light_is_black_at_once_and_says_so() {
+    let folder = Folder::new("dark");
+    std::fs::write(folder.path("scene.mtl"), "newmtl floor\nKd 0.5 0.5 0.5\n").unwrap();
+    for (rules, spp) in [("", 1), ("--time 1h", 1), ("--error 1e-9", 1), ("--spp 3", 3)] {
+        let output = folder.run(&format!("render scene.obj -o a.pfm --size 8x8 {rules} --json"));
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.contains("note: nothing in this scene emits light"), "{said}");
+        let object: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!((output.status.code(), &object["spp"]), (Some(0), &spp.into()), "{rules}");
+    }
+    assert_eq!(read(&folder.path("a.pfm")).unwrap(), Image::black(8, 8));
+}
+
+#[test]
 fn a_report_is_a_page_a_curve_and_the_same_object() {
     let folder = Folder::new("report");
     let object = folder.object("render scene.obj -o a.png --size 20x16 --spp 16 --report out --json");

@@ -3,6 +3,7 @@
 
 mod camera;
 mod class;
+mod dark;
 mod framing;
 mod input;
 mod light;

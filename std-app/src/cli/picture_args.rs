@@ -3,7 +3,7 @@
 
 use super::camera_args::CameraArgs;
 use super::failure::Failure;
-use super::{read_picture, values};
+use super::{print_note, read_picture, values};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use halflight::load::{LoadOptions, LoadedScene};
@@ -17,6 +17,7 @@ use halflight::save::Image;
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::cache::radiance::Basis;
 use halflight_core::photon;
+use halflight_core::scene::Scene;
 use halflight_simd::{Level, Tier};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -350,6 +351,15 @@ impl MethodArgs {
 /// File name of a scene.
 pub(super) fn file_name(scene: &Path) -> String {
     scene.file_name().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Notes that a scene is dark; returns whether it is. More samples of its black picture show nothing.
+pub(super) fn note_darkness(scene: &Scene) -> bool {
+    let is_dark = scene.is_dark();
+    if is_dark {
+        print_note("nothing in this scene emits light: the picture is black. Add a light or an environment");
+    }
+    is_dark
 }
 
 /// Failure of a render of `scene`, with advice.

@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::outputs::Outputs;
-use super::picture_args::{MethodArgs, PictureArgs, file_name, render_failure};
+use super::picture_args::{MethodArgs, PictureArgs, file_name, note_darkness, render_failure};
 use super::progress::ProgressReporter;
 use super::race_entry::{RaceEntry, race_entry};
 use super::{print_note, values};
@@ -86,6 +86,7 @@ impl Race {
         let all = self.methods.iter().map(settings).collect::<Result<Vec<_>, _>>()?;
         let views = loaded.views();
         let scene = views.scene(self.picture.camera.camera(&loaded)?);
+        note_darkness(&scene);
 
         interrupt::install_handler()?;
         let results = self.renders(&scene, &all)?;

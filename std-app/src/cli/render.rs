@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::outputs::{Outputs, Role};
-use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, render_failure};
+use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, note_darkness, render_failure};
 use super::progress::ProgressReporter;
 use super::{print_note, summary, values};
 use clap::{Args, ValueEnum};
@@ -99,6 +99,12 @@ impl Render {
         loaded.repairs.iter().for_each(print_note);
         self.check_method(&loaded)?;
         let (stop, by_default) = self.stop(&loaded)?;
+        let views = loaded.views();
+        let scene = views.scene(self.picture.camera.camera(&loaded)?);
+        let (stop, by_default) = match note_darkness(&scene) {
+            true => (Stop { spp: stop.spp.or(Some(1)), ..stop }, false),
+            false => (stop, by_default),
+        };
         let settings = self.picture.settings(&loaded, self.method, &self.method_args, stop, reference)?;
         let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
         let settings = Settings {
@@ -111,8 +117,6 @@ impl Render {
             photon_view: self.report.is_some(),
             ..settings
         };
-        let views = loaded.views();
-        let scene = views.scene(self.picture.camera.camera(&loaded)?);
 
         interrupt::install_handler()?;
         let mut reporter = ProgressReporter::new();
