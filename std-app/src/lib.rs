@@ -31,3 +31,4 @@ pub mod render;
 pub mod report;
 pub mod save;
 pub mod stability;
+pub mod values;

@@ -272,8 +272,9 @@ fn a_scene_file_places_lights_and_looks() {
     let camera = scene.camera.unwrap();
     assert_eq!((camera.lens_radius, camera.focus_distance), (0.0625, 1.25));
     assert_eq!(camera.eye, scene.transform.point([2.0, 2.0, 10.0]));
+    let settings = &scene.settings;
     assert_eq!(
-        (scene.settings.size, scene.settings.spp, scene.settings.seed),
+        (settings.size.map(<[u32; 2]>::from), settings.spp.map(u32::from), settings.seed),
         (Some([320, 200]), Some(16), None)
     );
 }
@@ -289,7 +290,16 @@ fn a_scene_file_that_is_wrong_says_where() {
     wrong("[[mesh]]\nfile = \"a.obj\"\nmaterial = \"gold\"", 3, "no material `gold`");
     wrong("[[mesh]]\nfile = \"a.obj\"\nscale = 2\nmatrix = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]", 2, "two ways");
     wrong("\n[[light]]\nkind = \"spot\"\nposition = [0, 0, 0]", 2, "this spot light needs `outer_degrees`");
-    wrong("[camera]\neye = [1, 1, 1]\nlook_at = [1, 1, 1]", 1, "same point");
+    let camera = "[camera]\neye = [1, 1, 1]\nlook_at = [1, 1, 1]";
+    wrong(camera, 1, "same point");
+    let camera = "\n[camera]\neye = [0, 0, 1]\nlook_at = [0, 0, 0]\n";
+    wrong(&format!("{camera}up = [0, 0, 0]"), 2, "along its `up`");
+    wrong(&format!("{camera}up = [0, 0, 2]"), 2, "along its `up`");
+    wrong(&format!("{camera}lens_radius = 1e9"), 2, "1000 times");
+    wrong(&format!("{camera}lens_radius = 1\nfocus_distance = 1e-20"), 2, "1000 times");
+    let light =
+        "[[mesh]]\nfile = \"a.obj\"\nscale = 1e30\n[[light]]\nkind = \"point\"\nposition = [0, 0, 0]\n";
+    wrong(&format!("{light}intensity = 1"), 4, "too small");
     wrong("[environment]\nto_world = [[2,0,0,0],[0,1,0,0],[0,0,1,0]]", 2, "angles and lengths");
     wrong("[environment]\nmap = \"sky.exr\"", 2, "there is no file");
     wrong("[render]\nsamples = 4", 2, "unknown field `samples`");

@@ -4,7 +4,7 @@
 use super::failure::Failure;
 use super::values::{self, Lens};
 use clap::Args;
-use halflight::load::{LoadedScene, View, direction};
+use halflight::load::{LoadedScene, View};
 use halflight_core::scene::Camera;
 
 /// Heading of the flags. `next_help_heading` would include flags of other structs.
@@ -26,7 +26,7 @@ pub(super) struct CameraArgs {
         help_heading = CAMERA)]
     up: Option<[f64; 3]>,
     /// Vertical field of view in degrees
-    #[arg(long, value_name = "DEG", value_parser = values::degrees, help_heading = CAMERA)]
+    #[arg(long, value_name = "DEG", value_parser = values::field_of_view, help_heading = CAMERA)]
     fov: Option<f64>,
     /// Radius of the thin lens, 0 for a pinhole, and distance in focus [default: that of --look-at]
     #[arg(long, value_name = "RADIUS[,DISTANCE]", value_parser = values::lens, help_heading = CAMERA)]
@@ -44,11 +44,11 @@ impl CameraArgs {
         if let Some(degrees) = self.fov {
             camera.tan_half_fov = (0.5 * degrees).to_radians().tan() as f32;
         }
-        if let Some(lens) = self.lens {
-            camera.lens_radius = scene.transform.length(lens.radius) as f32;
-            if let Some(distance) = lens.distance {
-                camera.focus_distance = scene.transform.length(distance) as f32;
-            }
+        if let Some(Lens { radius, distance }) = self.lens {
+            camera = scene.with_lens(camera, radius, distance).ok_or_else(|| {
+                Failure::new("--lens has more than 1000 times the distance in focus as its radius")
+                    .advice("both are lengths in the units of the scene")
+            })?;
         }
         Ok(view.map_or(camera, |view| scene.with_start(camera, view)))
     }
@@ -72,8 +72,7 @@ impl CameraArgs {
                 Failure::new("--eye and --look-at are the same point").advice("give two different points")
             );
         };
-        let up = direction([0.0; 3], up).unwrap_or_default();
-        if moved.forward.as_dvec3().cross(up).length() < PARALLEL {
+        if view.looks_along_up() {
             return Err(Failure::new("the camera looks along its up vector")
                 .advice("give another up vector, as in --up 0,0,1"));
         }
@@ -83,6 +82,3 @@ impl CameraArgs {
         Ok((Camera { tan_half_fov, lens_radius, focus_distance, ..moved }, view))
     }
 }
-
-/// Sine of the angle between view and up below which rounding errors would rotate the picture.
-const PARALLEL: f64 = 1e-4;

@@ -38,7 +38,7 @@ impl Info {
         let views = loaded.views();
         let scene = views.scene(self.camera.camera(&loaded)?);
         let census = Census::of(&scene);
-        let [width, height] = self.size.or(loaded.settings.size).unwrap_or([512, 512]);
+        let [width, height] = self.size.or(loaded.settings.size.map(<[u32; 2]>::from)).unwrap_or([512, 512]);
         let facts = Facts {
             footprints: [
                 ("bvh", Bvh::kept_footprint(scene.mesh.triangles.len()).bytes()),

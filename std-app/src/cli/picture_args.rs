@@ -14,6 +14,7 @@ use halflight::render::{
 };
 use halflight::report::quantity::readable_bytes;
 use halflight::save::Image;
+use halflight::values::Depth;
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::cache::radiance::Basis;
 use halflight_core::photon;
@@ -77,17 +78,17 @@ impl PictureArgs {
         reference: Option<Arc<Image>>,
     ) -> Result<Settings, Failure> {
         let (file, defaults) = (&loaded.settings, Settings::default());
-        let [width, height] = self.size.or(file.size).unwrap_or([defaults.width, defaults.height]);
+        let [width, height] =
+            self.size.or(file.size.map(<[u32; 2]>::from)).unwrap_or([defaults.width, defaults.height]);
         self.check_reference(reference.as_deref(), [width, height])?;
         args.check_degree()?;
-        let of_file = || MethodArg::from_str(file.method.as_deref()?, true).ok()?.0;
         Ok(args.apply(Settings {
-            method: method.0.or_else(of_file),
+            method: method.0.or(file.method.and_then(|method| method.0)),
             width,
             height,
             seed: file.seed.unwrap_or(defaults.seed),
-            max_depth: file.max_depth,
-            threads: self.threads.map(|threads| threads as usize),
+            max_depth: file.max_depth.map(u32::from),
+            threads: self.threads(),
             memory: self.memory,
             stop,
             reference,
@@ -158,9 +159,9 @@ pub(super) struct MethodArgs {
     #[arg(long, value_name = "WHEN", help_heading = "Light transport")]
     windows: Option<When>,
     /// Longest path in segments: 1 is emission seen directly, 2 adds direct light [default: no limit]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..),
+    #[arg(long, value_name = "N", value_parser = values::checked::<u32, Depth>,
         help_heading = "Light transport")]
-    max_depth: Option<u32>,
+    max_depth: Option<Depth>,
     /// Share of the work for path tracing some pixels to measure the bias [default: 5% if the method is
     /// biased]
     #[arg(long, value_name = "SHARE|off", value_parser = values::audit, help_heading = "Light transport")]
@@ -313,7 +314,7 @@ impl MethodArgs {
         let level = if self.precise { Level::BASELINE } else { Level::detect() };
         Settings {
             seed: self.seed.unwrap_or(settings.seed),
-            max_depth: self.max_depth.or(settings.max_depth),
+            max_depth: self.max_depth.map(u32::from).or(settings.max_depth),
             reuse: When::forced(self.reuse),
             caustics: !matches!(self.caustics, Some(Caustics::Off)),
             environment_visibility: When::forced(self.windows),

@@ -78,7 +78,7 @@ mod tests {
         let own = args(&special, &race);
         for (args, seed) in [(&own, 7), (&args(&race_entry("path:seed=1").unwrap(), &own), 1)] {
             let args = format!("{args:?}");
-            for part in ["max_depth: Some(3)", &format!("seed: Some({seed})"), "precise: true"] {
+            for part in ["max_depth: Some(Depth(3))", &format!("seed: Some({seed})"), "precise: true"] {
                 assert!(args.contains(part), "{args}");
             }
         }

@@ -6,11 +6,12 @@ use super::outputs::{Outputs, Role};
 use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, note_darkness, render_failure};
 use super::progress::ProgressReporter;
 use super::{print_note, summary, values};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use halflight::compare::compare;
 use halflight::load::{self, LoadedScene};
 use halflight::render::{self, Checkpoint, Ending, Settings, Shard, Stop};
 use halflight::report::{Provenance, Run};
+use halflight::values::{Samples, TargetError};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -37,15 +38,14 @@ pub(super) struct Render {
 
     /// Samples per pixel. Without --spp, --time and --error a render ends at relMSE 1e-3 or after 60 s; a
     /// shard has 256 samples
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 30),
-        display_order = 4)]
-    spp: Option<u32>,
+    #[arg(long, value_name = "N", value_parser = values::checked::<u32, Samples>, display_order = 4)]
+    spp: Option<Samples>,
     /// Rendering time, as in 30s, 2m, 1h
     #[arg(long, value_name = "TIME", value_parser = values::duration, display_order = 5)]
     time: Option<f64>,
     /// Stop when the 95 % upper bound of relMSE falls to this value
-    #[arg(long, value_name = "RELMSE", value_parser = values::positive, display_order = 6)]
-    error: Option<f64>,
+    #[arg(long, value_name = "RELMSE", value_parser = values::checked::<f64, TargetError>, display_order = 6)]
+    error: Option<TargetError>,
 
     /// Keep the film in a file during the render, for --resume and `halflight merge`
     #[arg(long, value_name = "FILE", help_heading = "Parts")]
@@ -97,7 +97,6 @@ impl Render {
         let load_seconds = loading.elapsed().as_secs_f64();
         loaded.files.iter().try_for_each(|file| outputs.protect(file))?;
         loaded.repairs.iter().for_each(print_note);
-        self.check_method(&loaded)?;
         let (stop, by_default) = self.stop(&loaded)?;
         let views = loaded.views();
         let scene = views.scene(self.picture.camera.camera(&loaded)?);
@@ -182,22 +181,16 @@ impl Render {
         }
     }
 
-    /// Refuses an unknown method of the scene file.
-    fn check_method(&self, loaded: &LoadedScene) -> Result<(), Failure> {
-        match loaded.settings.method.as_deref() {
-            Some(method) if MethodArg::from_str(method, true).is_err() => {
-                Err(Failure::new(format!("{}: there is no method `{method}`", self.scene.display()))
-                    .advice(format!("the methods are {}", MethodArg::names())))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// When to stop, and whether that is the default: neither flags nor scene file have a rule.
     fn stop(&self, loaded: &LoadedScene) -> Result<(Stop, bool), Failure> {
         let file = &loaded.settings;
-        let flags = Stop { spp: self.spp, seconds: self.time, error: self.error };
-        let rules = Stop { spp: file.spp, seconds: file.time, error: file.error };
+        let stop = |spp: Option<Samples>, seconds, error: Option<TargetError>| Stop {
+            spp: spp.map(u32::from),
+            seconds,
+            error: error.map(f64::from),
+        };
+        let flags = stop(self.spp, self.time, self.error);
+        let rules = stop(file.spp, file.time.map(f64::from), file.error);
         let stop = if flags == Stop::default() { rules } else { flags };
         if stop == Stop::default() && self.shard.is_none() {
             return Ok((Stop::SENSIBLE, true));

@@ -2,27 +2,31 @@
 
 use core::str::FromStr;
 use halflight::render::Shard;
+use halflight::values::{FieldOfView, NotNegative, Number, Positive, Seconds, Size};
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::cache::radiance::Basis;
 use halflight_simd::Tier;
 
+/// Number of a checked type.
+pub(super) fn checked<N: FromStr, T: TryFrom<N, Error = &'static str>>(text: &str) -> Result<T, String> {
+    let number: N = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
+    Ok(number.try_into()?)
+}
+
 /// Vector `X,Y,Z`.
 pub(super) fn vector(text: &str) -> Result<[f64; 3], String> {
-    let numbers = text.split(',').map(|number| finite(number.trim())).collect::<Result<Vec<_>, _>>()?;
+    let number = |text| checked::<f64, Number>(text).map(f64::from);
+    let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
     numbers.try_into().map_err(|_| "three numbers are expected, as in 0,1.5,-2".into())
 }
 
 /// Lens `RADIUS[,DISTANCE]`.
 pub(super) fn lens(text: &str) -> Result<Lens, String> {
     let (radius, distance) = match text.split_once(',') {
-        Some((radius, distance)) => (radius, Some(positive(distance.trim())?)),
+        Some((radius, distance)) => (radius, Some(positive(distance)?)),
         None => (text, None),
     };
-    let radius = finite(radius.trim())?;
-    if radius < 0.0 {
-        return Err("a lens has no negative radius".into());
-    }
-    Ok(Lens { radius, distance })
+    Ok(Lens { radius: not_negative(radius)?, distance })
 }
 
 /// Radius of the lens, and the distance in focus.
@@ -32,33 +36,23 @@ pub(super) struct Lens {
     pub(super) distance: Option<f64>,
 }
 
-/// Vertical field of view in degrees, above 0 and below 178.
-pub(super) fn degrees(text: &str) -> Result<f64, String> {
-    let degrees = finite(text)?;
-    let usable = degrees > 0.0 && degrees < 178.0;
-    usable.then_some(degrees).ok_or("a field of view is more than 0 and less than 178 degrees".into())
+/// Vertical field of view in degrees.
+pub(super) fn field_of_view(text: &str) -> Result<f64, String> {
+    checked::<f64, FieldOfView>(text).map(f64::from)
 }
 
 /// Size `WxH` in pixels.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
-    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
-    text.split_once(['x', 'X'])
-        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
-        .filter(|[width, height]| *width as usize * *height as usize <= halflight::save::MAX_PIXELS)
-        .ok_or(format!(
-            "width and height are expected, as in 640x480; at most {MAX_SIDE} a side and 2^28 pixels"
-        ))
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    let size = sides.and_then(|sides: [u32; 2]| Size::try_from(sides).ok()).map(<[u32; 2]>::from);
+    size.ok_or("width and height are expected, as in 640x480; at most 2^20 a side and 2^28 pixels".into())
 }
-
-/// Longest side of a picture in pixels, a limit of formats and of raster coordinates.
-const MAX_SIDE: u32 = 1 << 20;
 
 /// Time in seconds: `30s`, `2m`, `1.5h`, `250ms`, or a number of seconds.
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];
-    with_unit(text, &units)
-        .filter(|seconds| *seconds > 0.0)
-        .ok_or("a time is expected, as in 30s, 2m or 1h".into())
+    let seconds = with_unit(text, &units).and_then(|seconds| Seconds::try_from(seconds).ok());
+    seconds.map(f64::from).ok_or("a time is expected, as in 30s, 2m or 1h".into())
 }
 
 /// Bytes: `64K`, `512M`, `2G`, `1T` in powers of 1024, or a number of bytes.
@@ -121,14 +115,12 @@ pub(super) fn audit(text: &str) -> Result<f64, String> {
 
 /// Number above 0.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
-    let number = finite(text)?;
-    (number > 0.0).then_some(number).ok_or("a number above 0 is expected".into())
+    checked::<f64, Positive>(text).map(f64::from)
 }
 
 /// Number of at least 0.
 pub(super) fn not_negative(text: &str) -> Result<f64, String> {
-    let number = finite(text)?;
-    (number >= 0.0).then_some(number).ok_or("a number of at least 0 is expected".into())
+    checked::<f64, NotNegative>(text).map(f64::from)
 }
 
 fn finite(text: &str) -> Result<f64, String> {
@@ -165,7 +157,7 @@ mod tests {
             [shard("1/1"), shard("3/4")],
             [(0, 1), (2, 4)].map(|(index, count)| Ok(Shard { index, count }))
         );
-        assert_eq!((degrees("40"), positive("0.01")), (Ok(40.0), Ok(0.01)));
+        assert_eq!((field_of_view("40"), positive("0.01")), (Ok(40.0), Ok(0.01)));
         assert_eq!([audit("5%"), audit("0.25"), audit("off")], [Ok(0.05), Ok(0.25), Ok(0.0)]);
     }
 
@@ -190,7 +182,7 @@ mod tests {
             assert!(audit(text).is_err(), "{text}");
         }
         for text in ["0", "178", "-40", "wide"] {
-            assert!(degrees(text).is_err(), "{text}");
+            assert!(field_of_view(text).is_err(), "{text}");
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::far_camera::start;
 use super::texture_set::TextureSet;
 use super::transform::{SceneTransform, direction};
+use crate::values::{Depth, MethodName, Samples, Seconds, Size, TargetError};
 use glam::{DVec3, Vec3};
 use halflight_core::geometry::Bounds;
 use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
@@ -50,19 +51,19 @@ pub struct LoadedScene {
 #[serde(deny_unknown_fields)]
 pub struct RenderSettings {
     /// Width and height in pixels.
-    pub size: Option<[u32; 2]>,
+    pub size: Option<Size>,
     /// Samples per pixel.
-    pub spp: Option<u32>,
+    pub spp: Option<Samples>,
     /// Rendering time limit, in seconds.
-    pub time: Option<f64>,
+    pub time: Option<Seconds>,
     /// relMSE at which to stop.
-    pub error: Option<f64>,
+    pub error: Option<TargetError>,
     /// Longest path, in segments; 1: directly visible light.
-    pub max_depth: Option<u32>,
+    pub max_depth: Option<Depth>,
     /// Seed of all random numbers.
     pub seed: Option<u32>,
     /// Name of the method.
-    pub method: Option<String>,
+    pub method: Option<MethodName>,
 }
 
 /// Position and direction of a camera, in the coordinates of the files.
@@ -74,6 +75,18 @@ pub struct View {
     pub look_at: [f64; 3],
     /// Direction that is up in the picture.
     pub up: [f64; 3],
+}
+
+/// Sine of the angle between view and up below which rounding errors would rotate the picture.
+const PARALLEL: f64 = 1e-4;
+
+impl View {
+    /// True if no direction is up in the picture.
+    pub fn looks_along_up(&self) -> bool {
+        let along = direction(self.eye, self.look_at).unwrap_or_default();
+        let up = direction([0.0; 3], self.up).unwrap_or_default();
+        along.cross(up).length() < PARALLEL
+    }
 }
 
 /// The scene with the texture views that [`Scene`] borrows.
@@ -118,11 +131,27 @@ impl LoadedScene {
         Some(Camera { focus_distance: self.transform.length(distance) as f32, ..camera })
     }
 
+    /// `camera` with a lens of this radius and distance in focus, by default its own, in the units of the
+    /// files; `None` if the lens is too wide for it.
+    pub fn with_lens(&self, camera: Camera, radius: f64, focus: Option<f64>) -> Option<Camera> {
+        let focus = focus.map_or(f64::from(camera.focus_distance), |focus| self.transform.length(focus));
+        let focus = focus.min(FARTHEST_FOCUS);
+        let radius = self.transform.length(radius);
+        let lens = Camera { lens_radius: radius as f32, focus_distance: focus as f32, ..camera };
+        (radius <= WIDEST_LENS * focus).then_some(lens)
+    }
+
     /// The camera of the scene file, else one that frames the scene.
     pub fn camera_or_default(&self) -> Camera {
         self.camera.unwrap_or_else(|| Camera::framing(&self.mesh()))
     }
 }
+
+/// Distance in focus from which all rays through a pixel are parallel in f32, and squares are finite.
+const FARTHEST_FOCUS: f64 = 1e15;
+
+/// Largest ratio of the radius of a lens to its distance in focus; of a real one it is below a half.
+const WIDEST_LENS: f64 = 1e3;
 
 /// Largest extent of a scene whose bounding box is centred at the origin.
 const CENTRED: f32 = 4.0;

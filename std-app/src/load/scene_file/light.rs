@@ -1,9 +1,10 @@
 //! `[[light]]` and `[environment]`: lights without surface.
 
-use super::values::{BRIGHTEST, Colour, Degrees, Matrix, Number, Rotation};
+use super::values::{BRIGHTEST, Colour, Matrix, Rotation};
 use super::{LoadError, Source};
 use crate::load::map::Map;
 use crate::load::transform::{SceneTransform, direction as direction_between};
+use crate::values::{ConeAngle, Degrees, Number};
 use glam::{DMat3, Mat3};
 use halflight_core::Rgb;
 use halflight_core::scene::PointLight;
@@ -39,7 +40,7 @@ pub struct LightEntry {
     /// Irradiance of a directional light on a surface that faces it, W/m².
     pub irradiance: Option<Colour>,
     /// Half-angle of the cone of a spot light.
-    pub outer_degrees: Option<Degrees>,
+    pub outer_degrees: Option<ConeAngle>,
     /// Half-angle of full intensity; by default three quarters of the outer one.
     pub inner_degrees: Option<Degrees>,
 }
@@ -117,6 +118,10 @@ pub(super) fn light(
             let most = BRIGHTEST / transform.intensity_factor();
             let problem = "the `intensity` of this light is too large for a scene of this size";
             return Err(source.error(entry.span(), problem, format!("{most:.1e} W/sr are possible here")));
+        }
+        if intensity.channels() != [0.0; 3] && rgb(channels) == Rgb::ZERO {
+            let problem = "the `intensity` of this light is too small for a scene of this size";
+            return Err(source.error(entry.span(), problem, "f32 has no number for it: give a larger one"));
         }
         Ok(rgb(channels))
     };

@@ -1,8 +1,9 @@
 //! `[material.NAME]`: with `kind` a new material, without it changes to the material of that name.
 
-use super::values::{Colour, Number};
+use super::values::{Colour, Reflectance};
 use super::{LoadError, Source};
 use crate::load::mtl::{MapKind, MtlMaterial};
+use crate::values::{Fraction, NotNegative, Number, RefractiveIndex};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -32,29 +33,29 @@ pub struct MaterialEntry {
     /// Kind of a new material.
     pub kind: Option<MaterialKind>,
     /// Reflectance of a diffuse surface or of a metal (`Kd`).
-    pub color: Option<Colour>,
+    pub color: Option<Reflectance>,
     /// Texture of `color` (`map_Kd`).
     pub color_map: Option<Spanned<String>>,
     /// Reflectance of the coat at normal incidence (`Ks`).
-    pub specular: Option<Colour>,
+    pub specular: Option<Reflectance>,
     /// Texture of `specular` (`map_Ks`).
     pub specular_map: Option<Spanned<String>>,
     /// Phong exponent (`Ns`); `roughness` overrides it.
-    pub shininess: Option<Number>,
+    pub shininess: Option<NotNegative>,
     /// 0 smooth ... 1 rough; GGX alpha is its square (`Pr`).
-    pub roughness: Option<Number>,
+    pub roughness: Option<Fraction>,
     /// Texture of `roughness` (`map_Pr`).
     pub roughness_map: Option<Spanned<String>>,
     /// 0 coat over base ... 1 metal (`Pm`).
-    pub metallic: Option<Number>,
+    pub metallic: Option<Fraction>,
     /// Texture of `metallic` (`map_Pm`).
     pub metallic_map: Option<Spanned<String>>,
     /// Index of refraction (`Ni`).
-    pub ior: Option<Number>,
+    pub ior: Option<RefractiveIndex>,
     /// Factor on the transmission of glass (`Tf`).
-    pub tint: Option<Colour>,
+    pub tint: Option<Reflectance>,
     /// Probability that a ray hits the surface (`d`).
-    pub opacity: Option<Number>,
+    pub opacity: Option<Fraction>,
     /// Texture of `opacity` (`map_d`).
     pub opacity_map: Option<Spanned<String>>,
     /// Emitted radiance (`Ke`).
@@ -82,18 +83,18 @@ pub(in crate::load) struct MaterialChange {
 
 impl MaterialEntry {
     pub(super) fn resolved(&self, source: &Source) -> Result<MaterialChange, LoadError> {
-        let colour = |colour: Option<Colour>| colour.map(Colour::channels);
-        let number = |number: Option<Number>| number.map(f64::from);
+        let reflectance = |colour: Option<Reflectance>| colour.map(Reflectance::channels);
+        let fraction = |fraction: Option<Fraction>| fraction.map(f64::from);
         let mut change = MtlMaterial {
-            diffuse: colour(self.color),
-            specular: colour(self.specular),
-            emission: colour(self.emission),
-            tint: colour(self.tint),
-            shininess: number(self.shininess),
-            ior: number(self.ior),
-            opacity: number(self.opacity),
-            roughness: number(self.roughness),
-            metallic: number(self.metallic),
+            diffuse: reflectance(self.color),
+            specular: reflectance(self.specular),
+            emission: self.emission.map(Colour::channels),
+            tint: reflectance(self.tint),
+            shininess: self.shininess.map(f64::from),
+            ior: self.ior.map(f64::from),
+            opacity: fraction(self.opacity),
+            roughness: fraction(self.roughness),
+            metallic: fraction(self.metallic),
             surely_glass: self.kind == Some(MaterialKind::Glass),
             ..MtlMaterial::default()
         };
@@ -115,7 +116,7 @@ impl MaterialEntry {
         if let Some(kind) = self.kind {
             kind.complete(&mut change);
         }
-        let (is_new, bump_scale) = (self.kind.is_some(), number(self.bump_scale));
+        let (is_new, bump_scale) = (self.kind.is_some(), self.bump_scale.map(f64::from));
         Ok(MaterialChange { is_new, change, two_sided: self.two_sided, bump_scale })
     }
 }

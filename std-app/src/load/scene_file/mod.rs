@@ -11,7 +11,7 @@ pub use light::{EnvironmentEntry, LightEntry, LightKind};
 pub(super) use material::MaterialChange;
 pub use material::{MaterialEntry, MaterialKind};
 pub(super) use values::BRIGHTEST;
-pub use values::{Colour, Degrees, Factors, FieldOfView, Matrix, NotNegative, Number, Positive, Rotation};
+pub use values::{Colour, Factors, Matrix, Reflectance, Rotation};
 
 use super::error::LoadError;
 use super::files::{Found, Lookup};
@@ -20,10 +20,10 @@ use super::map::Map;
 use super::notes::Notes;
 use super::scene::{LoadedScene, RenderSettings, View};
 use super::{LoadOptions, SceneBuilder, memory_estimate, read, too_large};
+use crate::values::{FieldOfView, NotNegative, Number, Positive};
 use core::cell::RefCell;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
-use halflight_core::scene::Camera;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -238,10 +238,16 @@ fn place_camera(
     let pinhole = loaded.camera_at(view, fov).ok_or_else(|| {
         source.error(entry.span(), "`eye` and `look_at` are the same point", "move one of them")
     })?;
-    let length = |user: f64| loaded.transform.length(user) as f32;
-    let focus = camera.focus_distance.map_or(pinhole.focus_distance, |focus| length(focus.into()));
-    let lens_radius = length(f64::from(camera.lens_radius));
-    let camera = Camera { lens_radius, focus_distance: focus, ..pinhole };
+    if camera.up.is_some() && view.looks_along_up() {
+        let problem = "the camera looks along its `up`";
+        return Err(source.error(entry.span(), problem, "give another direction that is up in the picture"));
+    }
+    let camera = loaded
+        .with_lens(pinhole, camera.lens_radius.into(), camera.focus_distance.map(f64::from))
+        .ok_or_else(|| {
+        let problem = "`lens_radius` is more than 1000 times the distance in focus";
+        source.error(entry.span(), problem, "both are lengths in the units of the meshes")
+    })?;
     loaded.camera = Some(loaded.with_start(camera, view));
     loaded.view = Some(view);
     Ok(())

@@ -2,53 +2,13 @@
 
 use crate::load::geometry::Placement;
 use crate::load::transform::direction;
+use crate::values::{Factor, Number};
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
-
-/// Largest number: beyond it, f32 has no room for a change of scale.
-const LARGEST: f64 = 1e30;
 
 /// Largest radiance, irradiance or intensity: its square, and sums of squares of a picture, are finite in
 /// f32.
 pub(in crate::load) const BRIGHTEST: f64 = 1e15;
-
-macro_rules! checked {
-    ($($(#[$meta:meta])* $type:ident: $x:ident => $valid:expr, $problem:literal;)*) => {$(
-        $(#[$meta])*
-        #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-        #[serde(try_from = "f64")]
-        pub struct $type(f64);
-
-        impl TryFrom<f64> for $type {
-            type Error = &'static str;
-
-            fn try_from($x: f64) -> Result<Self, Self::Error> {
-                if $valid { Ok(Self($x)) } else { Err($problem) }
-            }
-        }
-
-        impl From<$type> for f64 {
-            fn from(value: $type) -> f64 {
-                value.0
-            }
-        }
-    )*};
-}
-
-checked! {
-    /// A finite number.
-    #[derive(Default)]
-    Number: x => x.abs() <= LARGEST, "this number must be finite and at most 1e30 in size";
-    /// A finite number, zero or above.
-    #[derive(Default)]
-    NotNegative: x => (0.0..=LARGEST).contains(&x), "this number must not be negative, and at most 1e30";
-    /// A finite number above zero.
-    Positive: x => x > 0.0 && x <= LARGEST, "this number must be above zero and at most 1e30";
-    /// An angle between 0 and 180 degrees, exclusive.
-    FieldOfView: x => x > 0.0 && x < 180.0, "this angle must lie between 0 and 180 degrees";
-    /// An angle from 0 to 180 degrees.
-    Degrees: x => (0.0..=180.0).contains(&x), "this angle must lie between 0 and 180 degrees";
-}
 
 /// One number for all three, or three. The type that it becomes checks it and explains a refusal.
 #[derive(Clone, Copy, Deserialize)]
@@ -93,6 +53,30 @@ impl Colour {
     }
 }
 
+/// Linear reflectance or transmittance of red, green, blue in 0 ... 1: one number for all three, or three.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "OneOrThree")]
+pub struct Reflectance([f64; 3]);
+
+impl TryFrom<OneOrThree> for Reflectance {
+    type Error = String;
+
+    fn try_from(value: OneOrThree) -> Result<Self, Self::Error> {
+        let channels = value.three();
+        match channels.iter().find(|channel| !(0.0..=1.0).contains(*channel)) {
+            None => Ok(Self(channels)),
+            Some(x) => Err(format!("{x:?} is no reflectance: a surface reflects and transmits 0 to 1")),
+        }
+    }
+}
+
+impl Reflectance {
+    /// The channels.
+    pub fn channels(self) -> [f64; 3] {
+        self.0
+    }
+}
+
 /// One factor for all three axes, or three.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "OneOrThree")]
@@ -103,7 +87,7 @@ impl TryFrom<OneOrThree> for Factors {
 
     fn try_from(value: OneOrThree) -> Result<Self, Self::Error> {
         let axes = value.three();
-        axes.into_iter().try_for_each(|axis| Number::try_from(axis).map(drop))?;
+        axes.into_iter().try_for_each(|axis| Factor::try_from(axis).map(drop))?;
         Ok(Self(axes))
     }
 }
@@ -141,7 +125,7 @@ impl TryFrom<RotationEntry> for Rotation {
 
     fn try_from(entry: RotationEntry) -> Result<Self, Self::Error> {
         let axis = direction([0.0; 3], entry.axis.map(f64::from));
-        Ok(Self { axis: axis.ok_or("the axis must not be zero")?, degrees: entry.degrees.0 })
+        Ok(Self { axis: axis.ok_or("the axis must not be zero")?, degrees: entry.degrees.into() })
     }
 }
 
@@ -168,11 +152,19 @@ impl TryFrom<Vec<[Number; 4]>> for Matrix {
 
     fn try_from(rows: Vec<[Number; 4]>) -> Result<Self, Self::Error> {
         let rows: Vec<[f64; 4]> = rows.into_iter().map(|row| row.map(f64::from)).collect();
-        match rows[..] {
-            [a, b, c] => Ok(Self([a, b, c])),
-            [a, b, c, [0.0, 0.0, 0.0, 1.0]] => Ok(Self([a, b, c])),
-            [_, _, _, _] => Err("the fourth row of a matrix must be [0, 0, 0, 1]"),
-            _ => Err("a matrix has three or four rows of four numbers"),
+        let matrix = match rows[..] {
+            [a, b, c] | [a, b, c, [0.0, 0.0, 0.0, 1.0]] => Self([a, b, c]),
+            [_, _, _, _] => return Err("the fourth row of a matrix must be [0, 0, 0, 1]"),
+            _ => return Err("a matrix has three or four rows of four numbers"),
+        };
+        let linear = matrix.linear();
+        let largest = linear.to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        // NaN for a matrix of zeros.
+        let volume = (linear * largest.recip()).determinant();
+        if volume != 0.0 && volume.is_finite() {
+            Ok(matrix)
+        } else {
+            Err("this matrix flattens what it transforms")
         }
     }
 }
