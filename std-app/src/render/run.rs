@@ -3,6 +3,7 @@
 use super::audit::Audit;
 use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
+use super::hidden_light;
 use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{self, Attempt, Method, Plan, RenderSetup};
@@ -125,12 +126,14 @@ impl WithFeatures for Render<'_> {
             let mut own = memory.within(&bank);
             let attempt = method::set_up::<F>(plan, &setup, &mut own).and_then(|attempt| match attempt {
                 Attempt::Ready(renderer) => {
-                    let audit = Audit::new::<F>(&setup, &mut own, renderer.chosen())?;
-                    Ok(Ok((renderer, audit)))
+                    let (method, findings) = (renderer.chosen(), renderer.findings());
+                    let audit = Audit::new::<F>(&setup, &mut own, method)?;
+                    let hidden = hidden_light::measure::<F>(&setup, &mut own, method, &findings)?;
+                    Ok(Ok((renderer, audit, hidden)))
                 }
                 Attempt::Instead(better) => Ok(Err(*better)),
             });
-            let (mut renderer, audit) = match attempt {
+            let (mut renderer, audit, hidden) = match attempt {
                 Ok(Ok(ready)) => ready,
                 Ok(Err(better)) => {
                     memory.release(&own);
@@ -152,6 +155,7 @@ impl WithFeatures for Render<'_> {
                 setup,
                 state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
                 audit,
+                hidden,
                 identity: identity(method),
                 resumed: resumed.take(),
                 clock: &mut clock,
