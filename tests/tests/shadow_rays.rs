@@ -93,8 +93,8 @@ fn shadow_rays_do_not_hit_lamps_at_random_places() {
     }
 }
 
-/// Lamps above each other, of which a floor sees the lowest alone. In a wide scene shadow rays end further from
-/// their lamps than these are apart.
+/// Lamps above each other, of which a floor sees the lowest alone. In a wide scene the offset point before a
+/// lamp is further from it than the next lamp.
 #[test]
 fn lamps_behind_a_lamp_add_no_light() {
     for (gap, extent) in [(1e-4, 2.0), (4e-6, 2.0), (1e-4, 300.0), (1e-3, 3000.0)] {

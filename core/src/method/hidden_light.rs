@@ -1,5 +1,5 @@
-//! Measure of the light that a method finds with no number of samples (`transport/photon_mapping/hidden.rs`), by
-//! photons before the picture. Its absence is a bias that the noise of the picture does not show.
+//! Measure of the light that a method finds with no number of samples, by photons before the picture
+//! (`transport/photon_mapping/hidden.rs`). Its absence is a bias that the noise of the picture does not show.
 
 use super::caustics;
 use super::executor::Executor;
@@ -165,8 +165,8 @@ impl HiddenLight {
         Self { rare, ..self }
     }
 
-    /// Error of a picture of `frame` pixels that lacks this light, from its `pixels`: place and radiance, mean
-    /// of the channels.
+    /// Error of a picture of `frame` pixels that lacks this light, from its `pixels`: place and radiance,
+    /// mean of the channels.
     pub fn lacking(&self, frame: [u32; 2], pixels: impl Iterator<Item = ([f64; 2], f64)>) -> LackingLight {
         let mut picture = Sums::default();
         pixels.for_each(|(at, light)| picture.add(at, frame, light));

@@ -177,8 +177,8 @@ impl<'m> GuideStats<'m> {
         Ok(EmissionSampler { guide: Some(EmissionGuide::new(table, side)), ..*emission })
     }
 
-    /// `emission` that chooses half of the paths by power and half evenly among the cells of all lights, before
-    /// anything was learned. `arena` needs [`GuideStats::guide_footprint`].
+    /// `emission` that chooses half of the paths by power and half evenly among the cells of all lights,
+    /// before anything was learned. `arena` needs [`GuideStats::guide_footprint`].
     ///
     /// # Errors
     /// [`OutOfMemory`] if the arena has less.

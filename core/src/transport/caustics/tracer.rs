@@ -66,8 +66,8 @@ pub struct GuideSample {
     pub cell: u32,
     /// Benefit of its photons; zero if none was stored.
     pub benefit: f32,
-    /// Block of the picture in which its last photon is visible, of [`BLOCKS`] across and down; a higher number
-    /// if none is visible.
+    /// Block of the picture in which its last photon is visible, of [`BLOCKS`] across and down; a higher
+    /// number if none is visible.
     pub block: u32,
     /// Radiance that its photons add to each pixel of their kernels, of light that path tracing rarely finds.
     pub light: f32,

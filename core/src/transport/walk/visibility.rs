@@ -11,8 +11,8 @@ use crate::transport::walk::termination::MAX_CROSSINGS;
 use glam::Vec3;
 use halflight_simd::kernels::triangles::{Shear, intersect};
 
-/// Factor on the `t` at which the tracer hits a lamp, for the end of a shadow ray: three roundings below it, so
-/// that a surface in the plane of the lamp does not hide it.
+/// Factor on the `t` at which the tracer hits a lamp, for the end of a shadow ray: four roundings below it,
+/// so that a surface in the plane of the lamp does not hide it.
 const BEFORE_LAMP: f32 = 1.0 - 4.0 * f32::EPSILON;
 
 /// Number of rays below which rays are traced one by one, since a batch has a setup cost.
@@ -29,7 +29,7 @@ pub(in crate::transport) struct ShadowRays<'w> {
 
 impl<F: Features> SceneContext<'_, F> {
     /// Shadow ray from `point` to the light of `sample`, which hits neither end. `None` if the offset light
-    /// point is on the other side of the surface: rounding may put a `point` that lies on the light behind it.
+    /// point is on the other side of the surface: rounding may put a `point` on the light behind it.
     #[inline]
     pub(in crate::transport) fn shadow_ray(&self, point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
         if let Some(target) = sample.target {
