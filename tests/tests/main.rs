@@ -16,6 +16,7 @@ mod far;
 mod furnace;
 mod golden;
 mod hall;
+mod hidden_light;
 mod irradiance_cache;
 mod irradiance_gaps;
 mod irradiance_rooms;

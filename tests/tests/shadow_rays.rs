@@ -92,3 +92,28 @@ fn shadow_rays_do_not_hit_lamps_at_random_places() {
         assert_light(&format!("place {index}"), &result.image.pixels, irradiance(distance, height, side));
     }
 }
+
+/// Lamps above each other, of which a floor sees the lowest alone. In a wide scene the offset point before a
+/// lamp is further from it than the next lamp.
+#[test]
+fn lamps_behind_a_lamp_add_no_light() {
+    for (gap, extent) in [(1e-4, 2.0), (4e-6, 2.0), (1e-4, 300.0), (1e-3, 3000.0)] {
+        for method in [Method::Path, Method::Bidirectional, Method::Metropolis] {
+            let [one, stack] = [1, 8].map(|count| {
+                let mut buffers =
+                    SceneBuffers::new(Camera::look_at(Vec3::new(0.0, 1.5, 2.0), Vec3::ZERO, Vec3::Y, 30.0));
+                let floor = buffers.material(Material::diffuse(Rgb::splat(0.6)));
+                let lamp = buffers.material(emitter(0.0, 12.0));
+                buffers.square(Vec3::ZERO, Vec3::Y, 2.0 * extent, floor);
+                for number in 0..count {
+                    buffers.square(Vec3::Y * (2.0 + gap * number as f32), Vec3::NEG_Y, 1.0, lamp);
+                }
+                let result =
+                    render(&buffers.scene(), method, 16, 256, |settings| settings.max_depth = Some(2));
+                let pixels = result.image.pixels;
+                pixels.iter().map(|pixel| f64::from(pixel[0])).sum::<f64>() / pixels.len() as f64
+            });
+            assert!((stack / one - 1.0).abs() < 0.02, "{method:?}, {gap} in {extent}: {stack} {one}");
+        }
+    }
+}

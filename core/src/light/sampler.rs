@@ -235,6 +235,14 @@ impl<'m> LightSampler<'m> {
         self.emitters.get(light as usize).map(|emitter| emitter.triangle)
     }
 
+    /// Triangles of emitter `light`; none for other kinds.
+    #[inline]
+    pub(crate) fn triangles_of(&self, light: u32) -> core::ops::Range<u32> {
+        self.emitters
+            .get(light as usize)
+            .map_or(0..0, |emitter| emitter.triangle..emitter.triangle + 1 + u32::from(emitter.is_pair()))
+    }
+
     /// Delta light number `light` in the order of emission; `None` for other kinds.
     #[inline]
     pub(super) fn without_surface<'s>(&self, scene: &Scene<'s>, light: usize) -> Option<&'s PointLight> {

@@ -4,6 +4,8 @@
 //! 1. Camera rays find visible points; for final gathering, points that light those.
 //! 2. A pilot traces light paths and counts those that leave photons near these points.
 //! 3. Where few do, cells are chosen by what they have brought, from pilot to pilot, until enough is known.
+//!    If next to none does, lights are chosen evenly once: a lamp in the room of the camera may have next to
+//!    no share of all power.
 //! 4. The last pilot shows whether the variance falls. If not, lights are chosen by power.
 
 use super::executor::Executor;
@@ -147,9 +149,20 @@ impl<'m> EmissionGuide<'m> {
         let first = if is_caustic { by_power } else { stats.guide(&by_power, &mut arena.scratch())? };
         let Some(first) = pilot.run::<F>(&first, 0, executor)? else { return Ok(()) };
         self.seen = Some(first.share());
+        if first.share() >= MOST_SEEN {
+            return Ok(());
+        }
         // Caustic photons are aimed at casters before any was seen.
-        let fewest = if is_caustic { 0 } else { FEWEST_TO_BEGIN };
-        if first.share() >= MOST_SEEN || first.count < fewest {
+        let explores = !is_caustic && first.count < FEWEST_TO_BEGIN;
+        let first = match explores {
+            true => {
+                let evenly = stats.evenly(&by_power, &mut arena.scratch())?;
+                let Some(found) = pilot.run::<F>(&evenly, MOST_PILOTS + 1, executor)? else { return Ok(()) };
+                found
+            }
+            false => first,
+        };
+        if explores && first.count < FEWEST_TO_BEGIN {
             return Ok(());
         }
         let teach = |stats: &mut GuideStats, pilot: &Pilot| {
@@ -164,7 +177,7 @@ impl<'m> EmissionGuide<'m> {
             seen += first.count;
         }
         // Without a photon the spread by power is unknown, but large.
-        let most = if first.count == 0 { f64::INFINITY } else { LESS * first.spread };
+        let most = if explores || first.count == 0 { f64::INFINITY } else { LESS * first.spread };
         for number in 1..=MOST_PILOTS {
             let before = seen;
             let guided = stats.guide(&by_power, &mut arena.scratch())?;

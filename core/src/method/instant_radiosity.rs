@@ -5,6 +5,7 @@
 //! If neighbouring pixels reuse paths, virtual lights light the second vertex, whose light all pixels of a
 //! circle receive; otherwise the first.
 
+use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::{Executor, Passed};
 use super::path::{PathTracing, Reuse};
 use super::splats::{add_splats, splats_of_tile};
@@ -20,6 +21,7 @@ use crate::transport::instant_radiosity::light_pass::{
 };
 use crate::transport::instant_radiosity::lighting::VirtualLighting;
 use crate::transport::instant_radiosity::lights::{VirtualLight, lit_area};
+use crate::transport::photon_mapping::deposit::PhotonFilter;
 use crate::transport::{Counters, PathIntegrator, PathReuse, PathSettings, path::WAVE};
 use bytemuck::{Pod, Zeroable};
 
@@ -28,6 +30,10 @@ const PIXELS_PER_LIGHT_PATH: usize = 16;
 
 /// The same where some caustics are found by light paths alone.
 const PIXELS_PER_SPLAT_PATH: usize = 2;
+
+/// Distance from the end of a gather ray within which a virtual light counts as useful, over the diagonal of
+/// the scene.
+const NEAR_GATHERED: f32 = 0.1;
 
 /// Sets of virtual lights at most.
 const MOST_SETS: usize = 1024;
@@ -155,14 +161,18 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         executor: &mut impl Executor,
         others: usize,
     ) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, ref bvh, lights: ref all, .. } = *context;
-        let footprint = EmissionSampler::footprint(all.count());
-        let emission =
-            EmissionSampler::build(scene, all, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;
-        let PathSettings { width, height, .. } = context.settings;
+        let all = context.lights;
+        let PathSettings { width, height, max_depth, .. } = context.settings;
         let tiles = if is_clamped { Tile::count(width, height) } else { 0 };
         let cut = slice("cut light", tiles, memory)?;
         let has_splats = has_hidden_caustics(&context.scene_context::<F>());
+        let guide = GuideSettings {
+            filter: PhotonFilter::All,
+            max_depth,
+            target: Target::Gathered(NEAR_GATHERED * context.bvh.bounds().diagonal()),
+            reserve: others.saturating_add(Self::footprint(1, has_splats).bytes()),
+        };
+        let emission = EmissionGuide::learn::<F>(context, guide, memory, executor)?.emission;
         let pixels = if has_splats { Tile::count(width, height) * PIXELS_PER_TILE } else { 0 };
         let picture = slice("splats", pixels, memory)?;
         let wanted = if all.is_empty() { 0 } else { settings.sets(context.pixels(), has_splats) };

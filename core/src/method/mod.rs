@@ -14,6 +14,7 @@ pub mod counts;
 pub mod emission_guide;
 pub mod environment_visibility;
 pub mod executor;
+pub mod hidden_light;
 pub mod instant_radiosity;
 pub mod irradiance_cache;
 pub mod kind;

@@ -1,12 +1,14 @@
 //! Error of a picture: noise from its half-films, plus bias by an audit or by photon blur.
 
 use super::audit::{Audit, Audited};
+use super::hidden_light;
 use super::threads::Workers;
 use halflight_core::estimate::{
     BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
 };
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::method::RenderState;
+use halflight_core::method::hidden_light::{HiddenLight, LackingLight};
 use rayon::prelude::*;
 
 /// Error of a picture in its parts.
@@ -17,6 +19,8 @@ pub(super) struct ErrorReport {
     pub(super) audited: Option<Audited>,
     /// Noise and blur, if there are photons and no audit.
     pub(super) noise_and_blur: Option<NoiseAndBlur>,
+    /// Light that the method cannot find.
+    pub(super) lacking: Option<LackingLight>,
 }
 
 impl ErrorReport {
@@ -50,13 +54,19 @@ impl ErrorReport {
         {
             audited.total = audited.total.with_bias(noise_and_blur.blur);
         }
-        Self { noise, audited, noise_and_blur }
+        Self { noise, audited, noise_and_blur, lacking: None }
     }
 
     /// Estimate with all parts.
     pub(super) fn error(&self) -> Option<ErrorEstimate> {
         let audited = self.audited.as_ref().map(|audited| audited.total);
-        audited.or(self.noise_and_blur.map(|noise_and_blur| noise_and_blur.total)).or(self.noise)
+        let found = audited.or(self.noise_and_blur.map(|noise_and_blur| noise_and_blur.total)).or(self.noise);
+        self.lacking.map_or(found, |lacking| Some(lacking.beside(found)))
+    }
+
+    /// This report of a picture `film` that lacks `hidden` light.
+    pub(super) fn lacking(self, hidden: Option<&HiddenLight>, film: &Film) -> Self {
+        Self { lacking: hidden.map(|hidden| hidden_light::lacking(hidden, film)), ..self }
     }
 }
 

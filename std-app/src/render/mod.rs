@@ -17,6 +17,7 @@ mod film_file;
 mod fingerprint;
 mod gaps;
 mod held_out;
+mod hidden_light;
 mod history;
 mod memory;
 mod merge;

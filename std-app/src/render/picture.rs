@@ -4,6 +4,7 @@ use super::audit::Audit;
 use super::error_report::ErrorReport;
 use super::film_file::{self, Header, Identity, Reader};
 use super::gaps::{self, Sketch};
+use super::hidden_light;
 use super::history::{Clock, Reference, Round};
 use super::method::{Method, RenderSetup, Renderer};
 use super::rejected_tiles::{self, empty_pixels};
@@ -17,6 +18,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::findings::{Findings, Value};
+use halflight_core::method::hidden_light::HiddenLight;
 use halflight_core::method::{RenderState, Shard};
 use rayon::prelude::*;
 use std::path::Path;
@@ -48,6 +50,8 @@ pub(super) struct Picture<'a> {
     pub(super) setup: RenderSetup<'a>,
     pub(super) state: RenderState<'a>,
     pub(super) audit: Option<Audit<'a>>,
+    /// Light that the method cannot find.
+    pub(super) hidden: Option<HiddenLight>,
     pub(super) identity: Identity,
     pub(super) resumed: Option<Reader>,
     pub(super) clock: &'a mut Clock,
@@ -193,15 +197,18 @@ impl<'a> Progressive<'a> {
     fn estimate(&mut self, renderer: &mut dyn Renderer) -> Result<Option<ErrorEstimate>, RenderError> {
         self.step_audit(renderer)?;
         let start = Instant::now();
-        let Picture { setup, state, audit, .. } = &mut self.picture;
-        let mut report = ErrorReport::new(setup.workers, state, audit.as_ref());
+        let Picture { setup, state, audit, hidden, .. } = &mut self.picture;
+        let mut report =
+            ErrorReport::new(setup.workers, state, audit.as_ref()).lacking(hidden.as_ref(), &state.film);
         self.estimating = start.elapsed().as_secs_f64();
         self.estimated += self.estimating;
         report = self.extend_audit(report, renderer)?;
         let start = Instant::now();
         let has_floor = report.noise.is_some_and(|noise| self.rounds.has_floor(noise));
         let is_biased = report.audited.as_ref().is_some_and(|audited| self.rounds.is_out_of_reach(audited));
+        let lacks = report.lacking.is_some_and(|lacking| self.rounds.is_below(lacking.error.lower));
         self.lost = match () {
+            () if lacks => Some(Ending::Biased),
             () if self.picture.method.converges() => None,
             () if is_biased => Some(Ending::Biased),
             () => has_floor.then_some(Ending::NoiseFloor),
@@ -261,7 +268,8 @@ impl<'a> Progressive<'a> {
                 break;
             }
             let verdict = |noise| audit.verdict(workers, &state.film, noise);
-            report = ErrorReport::of_noise(report.noise, workers, state, verdict);
+            let lacking = report.lacking;
+            report = ErrorReport { lacking, ..ErrorReport::of_noise(report.noise, workers, state, verdict) };
         }
         Ok(report)
     }
@@ -310,9 +318,10 @@ impl<'a> Progressive<'a> {
             self.write_film(self.picture.clock.seconds(), Some(patience));
         }
         let start = Instant::now();
-        let Picture { setup, state, audit, .. } = &self.picture;
-        let report =
-            self.report.take().unwrap_or_else(|| ErrorReport::new(setup.workers, state, audit.as_ref()));
+        let Picture { setup, state, audit, hidden, .. } = &self.picture;
+        let report = self.report.take().unwrap_or_else(|| {
+            ErrorReport::new(setup.workers, state, audit.as_ref()).lacking(hidden.as_ref(), &state.film)
+        });
         self.estimated += start.elapsed().as_secs_f64();
         self.result(report, renderer, interrupted)
     }
@@ -354,7 +363,9 @@ impl<'a> Progressive<'a> {
             threads: workers.count(),
             seconds: Seconds { build: 0.0, render, estimate: self.estimated },
             counters: state.counters,
-            findings: findings.and(survey.as_ref().map(Survey::finding)),
+            findings: findings
+                .and(report.lacking.as_ref().map(hidden_light::finding))
+                .and(survey.as_ref().map(Survey::finding)),
             survey,
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },
             rejected_tiles: rejected_tiles::rejected_tiles(state.dropped, settings.width, settings.height),

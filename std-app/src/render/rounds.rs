@@ -244,6 +244,11 @@ impl Rounds {
         enough && !audited.is_blind && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
     }
 
+    /// True if the requested error is below the `least` that the picture has.
+    pub(super) fn is_below(&self, least: f64) -> bool {
+        self.spp >= FEWEST_FOR_ERROR && self.stop.error.is_some_and(|wanted| least > wanted)
+    }
+
     /// True if `noise` shared by all samples stays above the requested error. Noise falls as a + b/n with n
     /// samples; a is significant if the lower end of noise is far above the extrapolated b/n.
     pub(super) fn has_floor(&mut self, noise: ErrorEstimate) -> bool {

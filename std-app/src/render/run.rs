@@ -4,6 +4,7 @@ use super::audit::Audit;
 use super::built::{Built, BuiltMemory};
 use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
+use super::hidden_light;
 use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{self, Attempt, Method, RenderSetup};
@@ -153,11 +154,15 @@ impl WithFeatures for Render<'_> {
                     continue;
                 }
                 Ok(Attempt::Ready(renderer)) => {
-                    Audit::new::<F>(&setup, &mut own, renderer.chosen()).map(|audit| (renderer, audit))
+                    let (method, findings) = (renderer.chosen(), renderer.findings());
+                    Audit::new::<F>(&setup, &mut own, method).and_then(|audit| {
+                        let hidden = hidden_light::measure::<F>(&setup, &mut own, method, &findings)?;
+                        Ok((renderer, audit, hidden))
+                    })
                 }
                 Err(error) => Err(error),
             };
-            let (mut renderer, audit) = match ready {
+            let (mut renderer, audit, hidden) = match ready {
                 // A method that was chosen may need more memory than path tracing.
                 Err(RenderError::Memory { .. }) if may_fall_back => {
                     may_fall_back = false;
@@ -172,6 +177,7 @@ impl WithFeatures for Render<'_> {
                 setup,
                 state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
                 audit,
+                hidden,
                 identity: request.identity(method),
                 resumed: resumed.take(),
                 clock: &mut clock,

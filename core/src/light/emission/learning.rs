@@ -177,6 +177,22 @@ impl<'m> GuideStats<'m> {
         Ok(EmissionSampler { guide: Some(EmissionGuide::new(table, side)), ..*emission })
     }
 
+    /// `emission` that chooses half of the paths by power and half evenly among the cells of all lights,
+    /// before anything was learned. `arena` needs [`GuideStats::guide_footprint`].
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] if the arena has less.
+    pub fn evenly<'g>(
+        &self,
+        emission: &EmissionSampler<'g>,
+        arena: &mut Arena<'g>,
+    ) -> Result<EmissionSampler<'g>, OutOfMemory> {
+        let (cells, of_light) = (self.learned.len(), self.side * self.side);
+        let weight = |i: usize| emission.table.pdf(i / of_light) / of_light as f32 + 1.0 / cells as f32;
+        let table = AliasTable::build(cells, weight, arena)?;
+        Ok(EmissionSampler { guide: Some(EmissionGuide::new(table, self.side)), ..*emission })
+    }
+
     /// Benefit of cell `i` and part of that of its neighbours: few photons show only part of what is useful.
     fn smoothed(&self, i: usize) -> f32 {
         let side = self.side;

@@ -82,7 +82,8 @@ pub(super) struct Benefit {
 
 /// The fraction of light paths that the camera sees.
 pub(super) fn visible(found: &[GuideSample]) -> f64 {
-    found.iter().filter(|path| path.light > 0.0).count() as f64 / found.len().max(1) as f64
+    let is_visible = |path: &&GuideSample| path.light > 0.0 && (path.block as usize) < ALL;
+    found.iter().filter(is_visible).count() as f64 / found.len().max(1) as f64
 }
 
 /// Mean radiance that the light paths `found` bring to a picture of `pixels` pixels, in discs of `radius`
@@ -131,7 +132,8 @@ impl Benefit {
         let of_block = disc * ALL as f64 / pixels;
         let mut hits = 0.0;
         for path in brightest_first(found) {
-            let Some(block) = blocks.get_mut(path.block as usize) else { continue };
+            // Light of invisible surfaces is spread over all blocks.
+            let Some(block) = blocks.get_mut(path.block as usize % ALL) else { continue };
             let light = of_block * f64::from(path.light);
             hits += SAMPLES * disc * f64::from(path.hits);
             block.light += light;

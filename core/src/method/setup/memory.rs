@@ -65,6 +65,7 @@ impl Unbuilt<'_> {
             }
             MethodKind::InstantRadiosity | MethodKind::ClampedInstantRadiosity => {
                 InstantRadiosity::<F>::usual_footprint(size, lights, &options.virtual_lights)
+                    .and(guide(PhotonFilter::All))
             }
             MethodKind::Metropolis => Metropolis::<F>::usual_footprint(size, lights, &options.metropolis),
         }

@@ -22,7 +22,6 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::light::{LightWalk, PATHS_PER_TASK};
 use crate::transport::walk::termination::{MAX_CROSSINGS, continuation_probability};
-use crate::transport::walk::visibility::shadow_ray;
 use crate::{Level, Rgb};
 use glam::Vec3;
 
@@ -216,7 +215,8 @@ impl<'a> Reference<'a> {
         };
         let weight = Path::joined(end, &[], vertices, lens).map_or(0.0, |path| self.weight(&path, 1));
         let arrives = throughput * value * light.radiance * (weight / light.pdf);
-        let arrives = shadow_ray(point, &light).and_then(|ray| context.transmit(ray, arrives, &mut 0));
+        let arrives =
+            context.shadow_ray(point, &light).and_then(|ray| context.transmit(ray, arrives, &mut 0));
         arrives.filter(|light| light.is_finite()).unwrap_or_default()
     }
 

@@ -1,12 +1,12 @@
 //! A vertex of a camera path whose light sample and next ray have been computed in lanes.
 
 use crate::Rgb;
-use crate::bsdf::{Bsdf, BsdfSample};
+use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::geometry::Ray;
 use crate::light::LightSample;
-use crate::scene::Scene;
 use crate::transport::walk::block::Block;
 use crate::transport::walk::block_scatter::Sets;
+use crate::transport::walk::context::SceneContext;
 use glam::Vec3;
 use halflight_simd::kernels::shade::at;
 
@@ -45,10 +45,10 @@ impl<'s> Shaded<'s> {
         set >> (self.i & 15) & 1 == 1
     }
 
-    /// The light sample of the vertex, with its radiance in `scene`.
-    pub(in crate::transport) fn lit(&self, scene: &Scene) -> Option<Lit> {
+    /// The light sample of the vertex, with its radiance in the scene of `context`.
+    pub(in crate::transport) fn lit<F: Features>(&self, context: &SceneContext<F>) -> Option<Lit> {
         let Self { block, i, .. } = *self;
-        let (light, i) = (&block.light, i & 15);
+        let (scene, light, i) = (context.scene, &block.light, i & 15);
         let [r, g, b, pdf] = block.shadows.contribution[i];
         if !self.is_in(block.shadows.exists) {
             return None;
@@ -69,7 +69,7 @@ impl<'s> Shaded<'s> {
             },
             value: Rgb::new(r, g, b),
             pdf,
-            ray: bytemuck::cast(block.shadows.rays[i]),
+            ray: block.shadow_ray(context, i),
         })
     }
 

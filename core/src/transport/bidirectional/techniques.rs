@@ -20,7 +20,6 @@ use crate::transport::bidirectional::vertex::{
     LightVertex, Scattering, reverse_pdf, scattering, scattering_from_light,
 };
 use crate::transport::walk::dimension;
-use crate::transport::walk::visibility::shadow_ray;
 use glam::Vec3;
 
 impl<F: Features> CameraPaths<'_, F> {
@@ -82,7 +81,7 @@ impl<F: Features> CameraPaths<'_, F> {
         let (scene, lights) = (context.scene, &context.lights);
         let Vertex { point, bsdf, wo, sums, .. } = *vertex;
         let Lit { light, value, pdf, ray } = match &vertex.shaded {
-            Some(shaded) => shaded.lit(scene)?,
+            Some(shaded) => shaded.lit(context)?,
             None => self.sample_light(path.segments, vertex)?,
         };
         let pdf = if light.delta { 0.0 } else { pdf };
@@ -118,7 +117,7 @@ impl<F: Features> CameraPaths<'_, F> {
         if value == Rgb::ZERO {
             return None;
         }
-        Some(Lit { light, value, pdf, ray: shadow_ray(point, &light)? })
+        Some(Lit { light, value, pdf, ray: self.context.shadow_ray(point, &light)? })
     }
 
     /// Draws the light vertices that the vertex at the end of a path's segment is connected to, one of each

@@ -66,7 +66,8 @@ pub struct GuideSample {
     pub cell: u32,
     /// Benefit of its photons; zero if none was stored.
     pub benefit: f32,
-    /// Block of the picture in which its last photon is visible, of [`BLOCKS`] across and down.
+    /// Block of the picture in which its last photon is visible, of [`BLOCKS`] across and down; a higher
+    /// number if none is visible.
     pub block: u32,
     /// Radiance that its photons add to each pixel of their kernels, of light that path tracing rarely finds.
     pub light: f32,
@@ -162,13 +163,19 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
                 let radius = self.radii.radius(position);
                 let pixels = 1.0 / (radius * radius);
                 sample.cell = state.cell;
+                let light = REFLECTED / PI * power * pixels / PI;
                 let Some(block) = self.block(position) else {
                     sample.benefit += power * pixels * INDIRECT;
+                    if weight.ratio == 0.0 {
+                        // No path finds what the surface sends on to others, wherever they are.
+                        sample.light += INDIRECT * light;
+                        (sample.hits, sample.flash) = (0.0, f32::INFINITY);
+                        sample.block = BLOCKS * BLOCKS + state.number;
+                    }
                     return;
                 };
                 sample.benefit += power * pixels;
                 sample.block = block;
-                let light = REFLECTED / PI * power * pixels / PI;
                 let whole = light * weight.probability / weight.weight;
                 sample.light += light;
                 (sample.hits, sample.flash) = (weight.ratio / weight.probability, whole / weight.ratio);

@@ -17,7 +17,6 @@ use crate::transport::bidirectional::shaded::Lit;
 use crate::transport::bidirectional::vertex::normal_for_lights;
 use crate::transport::bidirectional::vertex::{reverse_pdf, scattering, scattering_from_light};
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::visibility::shadow_ray;
 use glam::{Vec2, Vec3};
 
 impl<F: Features> Walk<'_, F> {
@@ -96,7 +95,7 @@ impl<F: Features> Walk<'_, F> {
         if value == Rgb::ZERO {
             return None;
         }
-        Some(Lit { light, value, pdf, ray: shadow_ray(point, &light)? })
+        Some(Lit { light, value, pdf, ray: self.context.shadow_ray(point, &light)? })
     }
 
     /// The light sample `lit` at `vertex`: its shadow ray, with the light that arrives if nothing is in its

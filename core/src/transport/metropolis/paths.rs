@@ -228,7 +228,7 @@ impl<'a, F: Features> Paths<'a, F> {
         let vertex = self.walk.camera_vertex(&path.subpath, surface, direction, [0.5; 2]);
         let sample = || self.walk.sample_light(&vertex, numbers.light(segments));
         if !vertex.bsdf.is_delta()
-            && let Some(lit) = shaded.lit(scene, sample)
+            && let Some(lit) = shaded.lit(&self.walk.context, sample)
             && let Some((shadow, arrives)) = self.walk.light_sample(&path.subpath, &vertex, lit)
         {
             shadows.push(ray.tag, shadow, self.part(path, segments + 1, part, &arrives));

@@ -37,8 +37,12 @@ impl ShadedHit<'_> {
 
     /// Light sample of the vertex; `sample` takes it without lanes.
     #[inline]
-    pub(super) fn lit(&self, scene: &Scene, sample: impl FnOnce() -> Option<Lit>) -> Option<Lit> {
-        self.shaded.map_or_else(sample, |shaded| shaded.lit(scene))
+    pub(super) fn lit<F: Features>(
+        &self,
+        context: &SceneContext<F>,
+        sample: impl FnOnce() -> Option<Lit>,
+    ) -> Option<Lit> {
+        self.shaded.map_or_else(sample, |shaded| shaded.lit(context))
     }
 
     /// BSDF sample of the vertex; `sample` takes it without lanes.

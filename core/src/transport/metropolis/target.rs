@@ -334,7 +334,7 @@ impl<'a, F: Features> Target<'a, F> {
         let (shadow, contribution) = match technique {
             Technique::LightSample => {
                 let sample = || self.walk.sample_light(&vertex, numbers.light_sample());
-                let lit = shaded.lit(self.walk.context.scene, sample)?;
+                let lit = shaded.lit(&self.walk.context, sample)?;
                 self.walk.light_sample(subpath, &vertex, lit)?
             }
             _ => {

@@ -11,7 +11,6 @@ use crate::light::LightSample;
 use crate::sampling::Sampler;
 use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
-use crate::transport::walk::visibility::shadow_ray;
 use crate::transport::wavefront::TO_ENVIRONMENT;
 use crate::transport::wavefront::Wavefront;
 use glam::Vec3;
@@ -88,7 +87,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
         if f == Rgb::ZERO && coat.0 == Rgb::ZERO {
             return None;
         }
-        let ray = shadow_ray(point, sample)?;
+        let ray = self.context.shadow_ray(point, sample)?;
         let alone = sample.delta || rest.ends && !apart;
         let each = 1.0 / rest.light_samples as f32;
         let weigh = |pdf: f32| match alone {

@@ -13,7 +13,6 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
 use crate::transport::walk::termination::{MAX_CROSSINGS, MAX_VERTICES, continuation_probability, is_cut};
-use crate::transport::walk::visibility::shadow_ray;
 use crate::{Level, Rgb};
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -237,7 +236,7 @@ fn light_sample(
         false => power_heuristic(light.pdf, pdf),
     };
     let sent = throughput * f * light.radiance * (weight / light.pdf);
-    let arriving = shadow_ray(point, &light).and_then(|ray| context.transmit(ray, sent, &mut 0));
+    let arriving = context.shadow_ray(point, &light).and_then(|ray| context.transmit(ray, sent, &mut 0));
     let environment = scene.environment.as_ref().filter(|_| later);
     let seen = environment.map_or(Rgb::ONE, |e| e.radiance(scene, light.direction));
     arriving.unwrap_or_default() * seen

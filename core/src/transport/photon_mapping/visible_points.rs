@@ -2,10 +2,11 @@
 //! through glass, in a map of their own. A photon counts as visible if a visible point is near. This may be
 //! inexact, since guided emission sends some light everywhere.
 
-use crate::bsdf::Features;
+use crate::bsdf::{Bsdf, Features};
 use crate::memory::Footprint;
 use crate::photon::{Kernel, Photon, PhotonMap, Photons, QueryDisc, Uniform};
 use crate::sampling::Sampler;
+use crate::scene::SurfacePoint;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::{SceneContext, Segment};
@@ -79,14 +80,34 @@ impl VisiblePointSampler {
         counters
     }
 
+    /// Visible point of ray `number`, with numbers of `seed`.
     fn along<F: Features>(
         &self,
         context: &SceneContext<F>,
-        (seed, number): (u32, u32),
+        number: (u32, u32),
         counters: &mut Counters,
     ) -> Option<Photon> {
+        let Seen { point, to_viewer, .. } = self.seen(context, number, counters)?;
+        Some(Photon::new(point.position, to_viewer, point.geometric_normal, Rgb::ZERO))
+    }
+
+    /// Corner of the cell of ray `number`, in pixels.
+    pub fn pixel(&self, number: usize) -> [f64; 2] {
+        let across = self.frame[0].div_ceil(self.step) as usize;
+        [number % across, number / across].map(|i| f64::from(self.step) * i as f64)
+    }
+
+    /// The first surface along ray `number` that stores photons, with numbers of `seed`.
+    pub(in crate::transport) fn seen<'a, F: Features>(
+        &self,
+        context: &SceneContext<'a, F>,
+        (seed, number): (u32, u32),
+        counters: &mut Counters,
+    ) -> Option<Seen<'a>> {
         let [width, height] = self.frame;
         let across = width.div_ceil(self.step);
+        let (mut throughput, mut is_first_rough, mut has_joint, mut is_rough) =
+            (Rgb::ONE, true, false, false);
         let sampler = Sampler::new(seed, number, 0);
         let [u, v] = sampler.pair(dimension::PIXEL);
         let at = |i: u32, u: f32, pixels: u32| ((i as f32 + u) * self.step as f32).min(pixels as f32);
@@ -99,7 +120,15 @@ impl VisiblePointSampler {
             let direction = Vec3::from(segment.ray.direction).normalize_or_zero();
             let bsdf = context.bsdf_at(&point);
             if bsdf.gathers_photons(true) && !mem::take(&mut gathers) {
-                return Some(Photon::new(point.position, -direction, point.geometric_normal, Rgb::ZERO));
+                has_joint |= is_rough;
+                return Some(Seen {
+                    point,
+                    bsdf,
+                    to_viewer: -direction,
+                    throughput,
+                    is_first_rough,
+                    has_joint,
+                });
             }
             let [u, v] = dimension::scattering(&sampler, segments);
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
@@ -108,10 +137,27 @@ impl VisiblePointSampler {
             if !point.sides_agree(sample.direction, onward) {
                 return None;
             }
+            throughput *= sample.weight;
+            has_joint |= is_rough && !sample.delta;
+            is_rough = !sample.delta;
+            is_first_rough &= is_rough || segments > 1;
             segment = segment.onward(&point, &hit, onward);
         }
         None
     }
+}
+
+/// Surface at the end of a camera ray.
+pub(in crate::transport) struct Seen<'a> {
+    pub(in crate::transport) point: SurfacePoint<'a>,
+    pub(in crate::transport) bsdf: Bsdf,
+    /// Unit direction to the vertex before.
+    pub(in crate::transport) to_viewer: Vec3,
+    pub(in crate::transport) throughput: Rgb,
+    /// True if the first surface is not specular, so that light paths may be connected to the camera.
+    pub(in crate::transport) is_first_rough: bool,
+    /// True if two neighbouring surfaces are not specular, so that they may be connected.
+    pub(in crate::transport) has_joint: bool,
 }
 
 /// Visible points and their radius.

@@ -3,6 +3,7 @@
 
 use crate::Level;
 use crate::bsdf::{COATS, Features};
+use crate::geometry::Ray;
 use crate::light::{ChosenLight, LightSample, emitted};
 use crate::transport::walk::block::Block;
 use crate::transport::walk::context::SceneContext;
@@ -70,6 +71,13 @@ impl Block<'_> {
             let surface = &points.surface;
             Direct { surface, bsdf, light, value, pdf, each, throughput }.reach(context.level, shadows);
         }
+    }
+
+    /// Shadow ray of vertex `i`, which has one.
+    #[inline]
+    pub(in crate::transport) fn shadow_ray<F: Features>(&self, context: &SceneContext<F>, i: usize) -> Ray {
+        let ray = bytemuck::cast(self.shadows.rays[i]);
+        if self.light.area >> i & 1 == 1 { context.ended_at_lamp(self.sampled[i], ray) } else { ray }
     }
 
     /// Evaluates and weighs the light samples of coats apart from their bases, after [`Block::light`].

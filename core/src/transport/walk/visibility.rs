@@ -9,22 +9,11 @@ use crate::scene::SurfacePoint;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use glam::Vec3;
+use halflight_simd::kernels::triangles::{Shear, intersect};
 
-/// Shadow ray from `point` to the light of `sample`, which hits neither end. `None` if the offset light point
-/// is on the other side of the surface: rounding may put a `point` that lies on the light behind it.
-#[inline]
-pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
-    if let Some(target) = sample.target {
-        // Offset from the light's surface, to the side of `point`.
-        let end = target.position + target.error * target.normal;
-        let heights = [end - point.position, sample.direction].map(|to| to.dot(point.geometric_normal));
-        return (heights[0] * heights[1] > 0.0).then(|| point.spawn_to(end));
-    }
-    if sample.distance < f32::INFINITY {
-        return Some(point.spawn_to(point.position + sample.distance * sample.direction));
-    }
-    Some(point.spawn(sample.direction))
-}
+/// Factor on the `t` at which the tracer hits a lamp, for the end of a shadow ray: four roundings below it,
+/// so that a surface in the plane of the lamp does not hide it.
+const BEFORE_LAMP: f32 = 1.0 - 4.0 * f32::EPSILON;
 
 /// Number of rays below which rays are traced one by one, since a batch has a setup cost.
 const FEW: usize = 32;
@@ -39,6 +28,40 @@ pub(in crate::transport) struct ShadowRays<'w> {
 }
 
 impl<F: Features> SceneContext<'_, F> {
+    /// Shadow ray from `point` to the light of `sample`, which hits neither end. `None` if the offset light
+    /// point is on the other side of the surface: rounding may put a `point` on the light behind it.
+    #[inline]
+    pub(in crate::transport) fn shadow_ray(&self, point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
+        if let Some(target) = sample.target {
+            // Offset from the light's surface, to the side of `point`.
+            let end = target.position + target.error * target.normal;
+            let heights = [end - point.position, sample.direction].map(|to| to.dot(point.geometric_normal));
+            let is_before = heights[0] * heights[1] > 0.0;
+            return is_before.then(|| self.ended_at_lamp(sample.light, point.spawn_to(end)));
+        }
+        if sample.distance < f32::INFINITY {
+            return Some(point.spawn_to(point.position + sample.distance * sample.direction));
+        }
+        Some(point.spawn(sample.direction))
+    }
+
+    /// `ray` to a point before the lamp that is number `light`, with the end where the tracer would hit the
+    /// lamp. The offset of the point is a bound for all coordinates of the scene, and may be larger than the
+    /// distance of a surface before the lamp, which would then not hide it.
+    #[inline]
+    pub(in crate::transport) fn ended_at_lamp(&self, light: u32, ray: Ray) -> Ray {
+        let shear = Shear::new(ray.direction);
+        let mut end = f32::INFINITY;
+        for triangle in self.lights.triangles_of(light) {
+            let corners = self.scene.mesh.corners(triangle).map(|corner| corner.to_array());
+            if let Some((t, ..)) = intersect(ray.origin, &shear, end, corners) {
+                end = t;
+            }
+        }
+        // At the border of the lamp the ray may miss it.
+        if end < f32::INFINITY { Ray { t_max: BEFORE_LAMP * end, ..ray } } else { ray }
+    }
+
     /// Traces the first `count` of `shadows` and calls `arrive` with each ray that reaches its light and with
     /// the transmitted light. Returns the number of rays that hit too many cut-outs. Increments `rays` per
     /// ray.
@@ -132,10 +155,11 @@ impl<F: Features> SceneContext<'_, F> {
         // A NaN transmits nothing.
         (transmittance > 0.0).then(|| {
             let direction = Vec3::from(ray.direction);
-            let rest = if ray.t_max == f32::INFINITY {
-                point.spawn(direction)
-            } else {
-                point.spawn_to(Vec3::from(ray.origin) + direction)
+            let rest = match ray.t_max {
+                f32::INFINITY => point.spawn(direction),
+                // Between the offset point before a lamp and the lamp: nothing else follows.
+                _ if hit.t >= 1.0 => Ray::segment(point.position, direction, -1.0),
+                _ => point.spawn_to(Vec3::from(ray.origin) + direction),
             };
             (Ray { tag: ray.tag, ..rest }, transmittance)
         })

@@ -98,7 +98,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             let tag = block.path[i] | if is_later { TO_ENVIRONMENT } else { 0 };
             let [r, g, b, _] = block.shadows.contribution[i];
             let light = if is_apart { at(&block.apart.contribution, i) } else { [r, g, b] };
-            let ray: Ray = bytemuck::cast(block.shadows.rays[i]);
+            let ray = block.shadow_ray(&self.context, i);
             wave.push_shadow_ray(Ray { tag, ..ray }, light.into());
         }
     }
