@@ -12,6 +12,7 @@ mod caustics_cached;
 mod choice;
 mod counts;
 mod environment_visibility;
+mod faint_caustics;
 mod far;
 mod furnace;
 mod golden;

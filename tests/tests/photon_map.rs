@@ -1,15 +1,17 @@
 //! Photon mapping in two passes: kernels and maps, light through a slit, and reduced memory.
 
+use glam::Vec3;
 use halflight::load::{self, LoadOptions};
 use halflight::render::{Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::findings::Decision;
 use halflight_core::photon::Kernel;
-use halflight_core::scene::{Scene, Surface};
+use halflight_core::scene::{Camera, Scene, Surface};
 use halflight_tests::references::reference;
 use halflight_tests::render::{finding, number, render};
-use halflight_tests::scenes::{cornell_box, lamp_before};
+use halflight_tests::rooms::diffuse;
+use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, lamp_before};
 use std::path::Path;
 
 fn mapped(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
@@ -32,6 +34,51 @@ const BIAS: f64 = 0.01;
 /// Largest bias of the mean where all light passes a door slit that is as narrow as the blur of so small a
 /// picture's few photons. Measured: 2 %, with 1 % of noise in both.
 const SLIT_BIAS: f64 = 0.05;
+
+/// Largest bias of the radiance between white walls, by photons at its edges.
+const DEEP_BIAS: f64 = 0.02;
+
+#[test]
+fn white_walls_have_the_light_of_many_bounces() {
+    let camera = Camera::look_at(Vec3::new(0.1, -0.2, 0.9), Vec3::new(0.1, -0.2, -1.0), Vec3::Y, 70.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let white = buffers.material(emitter(0.95, 0.05));
+    buffers.cuboid(Vec3::NEG_ONE, Vec3::ONE, true, white);
+    let mean = mapped(&buffers.scene(), 32, 32, |_| ()).image.mean();
+    let deviation = largest(mean.into_iter().map(|light| light - 1.0));
+    assert!(deviation.abs() < DEEP_BIAS, "{deviation}");
+}
+
+/// A room whose shading normals are bent by up to 45 degrees.
+fn bent_room() -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.1, -0.2, 0.3), Vec3::new(0.1, -0.2, -1.0), Vec3::Y, 70.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let (white, lamp) = (buffers.material(diffuse(0.7)), buffers.material(emitter(0.0, 5.0)));
+    buffers.cuboid(Vec3::NEG_ONE, Vec3::ONE, true, white);
+    for (i, face) in (0..).zip(buffers.positions.clone().chunks(4)) {
+        let normal = -face.iter().map(|corner| Vec3::from(*corner)).sum::<Vec3>() / 4.0;
+        for corner in 0..4 {
+            let angle = (4 * i + corner) as f32;
+            let bend = [0.0, 78.2, 156.4].map(|phase| (12.9 * angle + phase).sin());
+            let bent = normal + Vec3::from(bend).reject_from(normal);
+            buffers.normals.push(bent.normalize().to_array());
+        }
+    }
+    buffers.square(Vec3::new(0.0, 0.99, 0.0), Vec3::NEG_Y, 0.8, lamp);
+    buffers.normals.extend([[0.0, -1.0, 0.0]; 4]);
+    buffers
+}
+
+#[test]
+fn bent_normals_have_the_light_of_path_tracing() {
+    let buffers = bent_room();
+    let scene = buffers.scene();
+    let path = render(&scene, Method::Path, 32, 1024, |_| ()).image;
+    for method in [Method::PhotonMap, Method::ProgressivePhotons] {
+        let deviation = deviation(&render(&scene, method, 32, 64, |_| ()).image, &path);
+        assert!(deviation.abs() < DEEP_BIAS, "{method:?}: {deviation}");
+    }
+}
 
 #[test]
 fn every_kernel_estimates_the_same_light() {

@@ -58,6 +58,18 @@ impl Photon {
         Self { power: tag, ..Self::new(position, direction, normal, Rgb::ZERO) }
     }
 
+    /// This photon with another `power`.
+    pub(crate) fn with_power(self, power: Rgb) -> Self {
+        let (exponent, mantissas) = shared_exponent(power);
+        Self { light: self.light & !(0xff << 24) | exponent << 24, power: mantissas, ..self }
+    }
+
+    /// Bits of position and direction.
+    pub(crate) fn key(&self) -> [u32; 4] {
+        let [x, y, z] = self.position;
+        [x.to_bits(), y.to_bits(), z.to_bits(), self.light & !(0xff << 24)]
+    }
+
     /// Position.
     pub fn position(&self) -> Vec3 {
         Vec3::from_array(self.position)

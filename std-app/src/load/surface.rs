@@ -70,15 +70,16 @@ impl Resolver<'_> {
         Surface::Dielectric { ior: self.ior().unwrap_or(DEFAULT_IOR) as f32, tint, roughness }
     }
 
-    /// A metal of colour `Kd`, or `Ks` if `Kd` is black or absent; a perfect mirror if `Pr` is 0.
+    /// A metal of colour `Kd`, or `Ks` if `Kd` is black or absent; by `illum 3` a perfect mirror if `Pr` is 0.
     fn metal(&mut self, base: ColorInput) -> Surface {
         let is_absent = self.mtl.diffuse.is_none() && !self.mtl.has_map(MapKind::Diffuse);
         let by_specular = self.has_specular() && (is_black(&base) || is_absent);
         let reflectance = if by_specular { self.specular() } else { base };
-        if self.mtl.roughness == Some(0.0) && !self.mtl.has_map(MapKind::Roughness) {
-            return Surface::Mirror { reflectance };
+        let is_smooth = self.mtl.roughness == Some(0.0) && !self.mtl.has_map(MapKind::Roughness);
+        match (self.mtl.illumination, is_smooth) {
+            (Some(3), true) => Surface::Mirror { reflectance },
+            _ => Surface::Conductor { reflectance, roughness: self.roughness() },
         }
-        Surface::Conductor { reflectance, roughness: self.roughness() }
     }
 
     /// True if `illum 3` or `5` is a pure reflection: by `Ks` over a dark base, or by `Kd` without `Ks`.

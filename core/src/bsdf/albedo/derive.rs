@@ -137,8 +137,12 @@ fn transmittance(nodes: &Nodes, c: f64, alpha: f64, eta: f64) -> f64 {
     })
 }
 
-/// Mean internal reflectance, averaged as in Mitsuba 3: 64 cosines, both ends with full weight.
+/// Mean internal reflectance, averaged as in Mitsuba 3: 64 cosines, both ends with full weight. The limit of
+/// a smooth coat is exact.
 fn internal(nodes: &Nodes, alpha: f64, eta: f64) -> f64 {
+    if alpha == 0.0 {
+        return nodes.iter().map(|&(x, w)| w * 2.0 * x * fresnel(x, 1.0 / eta)).sum();
+    }
     let sum: f64 = (0..64)
         .map(|i| (f64::from(i) / 63.0).max(GRAZING))
         .map(|c| c * reflectance(nodes, c, alpha, &|c| fresnel(c, 1.0 / eta)))

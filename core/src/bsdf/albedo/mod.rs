@@ -132,7 +132,7 @@ pub(super) fn transmittance(c: f32, alpha: f32, eta: f32) -> f32 {
 
 /// Internal reflectance of a dielectric coat for uniform incident light. For rough coats it is the one-bounce
 /// reflectance, averaged over 64 cosines as in Mitsuba's `roughplastic` (1.6 % below the integral), so that
-/// pictures agree. The error makes surfaces darker.
+/// pictures agree. The error makes surfaces darker; towards the smooth coat it vanishes.
 #[inline]
 pub(super) fn internal_reflectance(alpha: f32, eta: f32) -> f32 {
     let smooth = 1.0 - (1.0 - fresnel::mean_external_reflectance(eta)) / (eta * eta);

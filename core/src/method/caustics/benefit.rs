@@ -2,6 +2,7 @@
 //!
 //! Photons pay in two cases: they carry much of the light; or they carry a little of it that path tracing
 //! finds so rarely that it would be most of the noise, such as the caustic of a small glass in a large room.
+//! Light that path tracing cannot find, of a point light through glass, needs them however little it is.
 
 use crate::transport::Pilot;
 use crate::transport::caustics::tracer::{BLOCKS, GuideSample};
@@ -31,6 +32,10 @@ const LEAST_HITS: f64 = 4.0;
 /// sees it.
 const MOST_MISSING: f64 = 5e-3;
 
+/// The same of light that path tracing finds with no number of samples. Less of it is below the rounding of
+/// pictures.
+const MOST_HIDDEN: f64 = 1e-6;
+
 /// Samples of a pilot. It does not see light that is found less often.
 const PILOT_SAMPLES: f64 = 4.0 * 16.0 * 1024.0;
 
@@ -55,6 +60,8 @@ struct Block {
     light: f64,
     /// Its part that path tracing never finds.
     missing: f64,
+    /// Part of that which no number of samples finds.
+    hidden: f64,
     /// Mean square of a sample of the other part by path tracing alone.
     square: f64,
     /// Its part that is too rare for a pilot.
@@ -76,6 +83,8 @@ pub(super) struct Benefit {
     rare: f64,
     /// Fraction of the light that path tracing never finds.
     missing: f64,
+    /// Its part that no number of samples finds.
+    hidden: f64,
     /// Mean radiance of all other light.
     pub(super) mean: f64,
 }
@@ -137,6 +146,7 @@ impl Benefit {
             let light = of_block * f64::from(path.light);
             hits += SAMPLES * disc * f64::from(path.hits);
             block.light += light;
+            block.hidden += if path.hits > 0.0 { 0.0 } else { light };
             if hits < LEAST_HITS {
                 block.missing += light;
                 continue;
@@ -156,12 +166,13 @@ impl Benefit {
         let over_blocks = |of: &dyn Fn(&Block) -> f64| blocks.iter().map(of).sum::<f64>() / ALL as f64;
         let noise = over_blocks(&|block| relative(block.square, block));
         let rare = over_blocks(&|block| relative(block.rare, block));
-        let missing = over_blocks(&|block| block.missing);
-        let missing = if missing > 0.0 { missing / (mean + radiance) } else { 0.0 };
+        let fraction = |light: f64| if light > 0.0 { light / (mean + radiance) } else { 0.0 };
+        let missing = fraction(over_blocks(&|block| block.missing));
+        let hidden = fraction(over_blocks(&|block| block.hidden));
         // The light of a pixel is that of the photons in its disc.
         let photons = visible * PATHS_PER_SAMPLE * disc;
         let noise_of_photons = if photons > 0.0 { share * share / photons } else { 0.0 };
-        Self { share, visible, noise, noise_of_photons, rare, missing, mean }
+        Self { share, visible, noise, noise_of_photons, rare, missing, hidden, mean }
     }
 
     /// The photon budget, relative to the usual one. The relative variance of photons is that of the few
@@ -173,12 +184,18 @@ impl Benefit {
 
     /// True if more light paths may find that photons pay.
     pub(super) fn may_pay(&self) -> bool {
-        self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= LEAST_VISIBLE
+        self.is_needed() || self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= LEAST_VISIBLE
     }
 
     /// True if photons may pay by their share of the light alone.
     pub(super) fn pays(&self) -> bool {
-        self.share >= LEAST_SHARE
+        self.is_needed() || self.share >= LEAST_SHARE
+    }
+
+    /// True if photons carry light that path tracing finds with no number of samples. A picture without
+    /// them would be wrong, not noisy.
+    pub(super) fn is_needed(&self) -> bool {
+        self.hidden >= MOST_HIDDEN
     }
 
     /// True if photons may pay in a picture whose samples have the relative variance `noise`.
@@ -191,7 +208,8 @@ impl Benefit {
     /// with photons.
     pub(super) fn path_tracing(&self, pilot: &Pilot, has_reuse: bool) -> PathTracingCost {
         // Light that is never found is not noise: without photons the picture would lack it.
-        let rare = if self.missing >= MOST_MISSING { f64::INFINITY } else { self.rare };
+        let is_missing = self.is_needed() || self.missing >= MOST_MISSING;
+        let rare = if is_missing { f64::INFINITY } else { self.rare };
         PathTracingCost { scatter: pilot.scatter(has_reuse) + rare, work: pilot.work(has_reuse) }
     }
 }
@@ -234,6 +252,7 @@ mod tests {
                 noise_of_photons: 0.0,
                 rare: 0.0,
                 missing: 0.0,
+                hidden: 0.0,
                 mean: 1.0,
             }
             .photon_budget()
@@ -280,6 +299,7 @@ mod tests {
             noise_of_photons,
             rare: 0.0,
             missing: 0.0,
+            hidden: 0.0,
             mean: 1.0,
         };
         assert!(benefit(0.04, 1.0, 1.0).pays() && !benefit(0.03, 1.0, 0.0).pays());
@@ -288,6 +308,17 @@ mod tests {
         assert!(!benefit(0.03, 1.0, 0.6).pays_beside(1.9));
         let may_pay = |share, visible| Benefit { visible, ..benefit(share, 0.0, 0.0) }.may_pay();
         assert!(may_pay(0.01, 0.0) && may_pay(0.0, 0.02) && !may_pay(0.001, 0.01));
+    }
+
+    #[test]
+    fn photons_are_needed_for_any_light_that_paths_cannot_find() {
+        let needed = |hits: f32, mean: f64| {
+            let benefit = Benefit::new(&mut [path(3e-3, hits, 7.0)], 1.0, PIXELS, mean);
+            assert_eq!(benefit.may_pay() && benefit.pays(), benefit.is_needed() || benefit.share > 0.1);
+            benefit.is_needed()
+        };
+        assert!(needed(0.0, 1e-6) && needed(0.0, 0.1) && needed(0.0, 1.0));
+        assert!(!needed(1e-3, 1.0) && !needed(0.0, 1e6));
     }
 
     #[test]

@@ -20,8 +20,9 @@ use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::{Counters, UNLIMITED};
 use crate::transport::walk::context::SceneContext;
 pub use crate::transport::walk::light::PATHS_PER_TASK;
-use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
+use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
 use crate::transport::walk::mis::{ChainLink, merging_weight};
+use crate::transport::walk::photon_buffer::PhotonBuffer;
 use crate::{Level, Rgb};
 use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
@@ -343,6 +344,12 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, PhotonWeight, &mut Counters)
     #[inline]
     fn is_apart(&self, state: &LightPathState, vertex: &Vertex) -> bool {
         state.segments > 1 && vertex.bsdf.gathers_photons_on_base(self.tracer.walk.context.separates_coats())
+    }
+
+    /// Behind a receiver the power includes the weight.
+    #[inline]
+    fn has_densities(&self, state: &LightPathState, vertex: &Vertex) -> bool {
+        state.path_pdfs != SCATTERED && !vertex.bsdf.is_receiver()
     }
 
     /// Multiplies `chain_ratio` by the ρ of a caster; sets it and `path_pdfs` at the first vertex.

@@ -137,6 +137,10 @@ impl<F: Features> Visitor for Writer<'_, F> {
         Some(Continuation { most: MAX_CONTINUATION, specular_only: false })
     }
 
+    fn has_densities(&self, _: &LightPathState, _: &Vertex) -> bool {
+        false
+    }
+
     fn leave(&self, state: &mut LightPathState, _: &Vertex, _: glam::Vec3, (sample, _): (&BsdfSample, bool)) {
         let is_mirrored = sample.delta && (state.segments == 1 || state.from_caster == 1);
         state.from_caster = u32::from(is_mirrored);

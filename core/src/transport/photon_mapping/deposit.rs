@@ -4,11 +4,10 @@
 //! shadow rays find direct light; all light; or caustics alone. `walk/light.rs` traces the paths.
 //!
 //! Departures from the plain algorithm:
-//! 1. After a photon is stored, the continuation probability is at most [`MAX_CONTINUATION`]. A path then
-//!    stores at most five photons on average in any scene, so that [`VERTICES_PER_TASK`] for a task is
-//!    enough: an overflow is 14 standard deviations above the mean, more survivals than any sequence of
-//!    random numbers contains.
-//! 2. The price: on surfaces of higher albedo, photons differ in power.
+//! 1. Between white walls a path stores many photons. If those of a task exceed [`VERTICES_PER_TASK`], a
+//!    random part of them is kept (`walk/photon_buffer.rs`). Paths are not ended earlier instead: photons of
+//!    long paths would have so much power that the variance of their sum is infinite from an albedo of 0.89
+//!    on.
 
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
@@ -19,10 +18,9 @@ use crate::scene::Scene;
 use crate::transport::photon_mapping::visible_points::VisiblePoints;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::light::{
-    Continuation, LightPathState, LightWalk, MAX_CONTINUATION, PhotonBuffer, Vertex, Visitor,
-};
+use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
 pub use crate::transport::walk::light::{PATHS_PER_TASK, VERTICES_PER_TASK};
+use crate::transport::walk::photon_buffer::PhotonSample;
 use crate::{Level, Rgb};
 
 /// Selection of the photons to store.
@@ -50,13 +48,10 @@ impl PhotonFilter {
 
     /// Continuation of the path behind `vertex`.
     #[inline]
-    pub(in crate::transport) fn continuation(self, vertex: &Vertex, stores: bool) -> Option<Continuation> {
+    pub(in crate::transport) fn continuation(self, vertex: &Vertex) -> Option<Continuation> {
         let ends = self == PhotonFilter::Caustic
             && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
-        (!ends).then_some(Continuation {
-            most: if stores { MAX_CONTINUATION } else { 1.0 },
-            specular_only: false,
-        })
+        (!ends).then_some(Continuation { most: 1.0, specular_only: false })
     }
 }
 
@@ -130,7 +125,7 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut depositor = Depositor { keep: self.keep, buffer: PhotonBuffer::new(out) };
+        let mut depositor = Depositor { keep: self.keep, buffer: PhotonSample::new(out) };
         let counters = self.flight.follow(task, map, scratch, &mut depositor)?;
         depositor.buffer.finish();
         Ok(counters)
@@ -173,6 +168,11 @@ impl Visitor for VisibilityCounter<'_> {
     const SEED: u64 = Depositor::SEED;
 
     #[inline]
+    fn has_densities(&self, _: &LightPathState, _: &Vertex) -> bool {
+        false
+    }
+
+    #[inline]
     fn meet(
         &mut self,
         state: &mut LightPathState,
@@ -188,18 +188,23 @@ impl Visitor for VisibilityCounter<'_> {
                 power,
             });
         }
-        self.keep.continuation(vertex, stores)
+        self.keep.continuation(vertex)
     }
 }
 
 /// Visitor that stores the selected photons.
 pub(in crate::transport) struct Depositor<'p> {
     keep: PhotonFilter,
-    buffer: PhotonBuffer<'p>,
+    buffer: PhotonSample<'p>,
 }
 
 impl Visitor for Depositor<'_> {
     const SEED: u64 = 0x7068_6f74_6f6e_7321;
+
+    #[inline]
+    fn has_densities(&self, _: &LightPathState, _: &Vertex) -> bool {
+        false
+    }
 
     #[inline]
     fn meet(
@@ -215,6 +220,6 @@ impl Visitor for Depositor<'_> {
                 self.buffer.push(vertex.photon(power), counters);
             }
         }
-        self.keep.continuation(vertex, stores)
+        self.keep.continuation(vertex)
     }
 }

@@ -15,7 +15,7 @@
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
-use crate::geometry::Ray;
+use crate::geometry::{Frame, Ray};
 use crate::light::luminance;
 use crate::memory::{Arena, Line};
 use crate::photon::{FLATNESS, Kernel, MIN_NORMAL_COSINE, Neighbours, Photon, PhotonMap, QueryDisc};
@@ -82,13 +82,22 @@ impl<'a> GlobalMapLookup<'a> {
         rotation: f32,
     ) -> Option<Rgb> {
         let (irradiance, radius) = self.irradiance((&context.bvh, context.level), point, distance)?;
-        if let Bsdf::Diffuse(diffuse) = bsdf {
-            return Some(irradiance * diffuse.reflectance * FRAC_1_PI);
-        }
         let (place, normal) = (point.position, point.geometric_normal);
         let disc = QueryDisc { place, normal, radius: radius.min(self.farthest), kernel: self.kernel };
         let light = Light { map: self.global, is_caustic: false, min_photons: f32::INFINITY };
-        Some(reflected(light, context, (&disc, None), (point, bsdf), wo, rotation).light)
+        let of_photons = |point: &SurfacePoint| {
+            reflected(light, context, (&disc, None), (point, bsdf), wo, rotation).light
+        };
+        let Bsdf::Diffuse(diffuse) = bsdf else { return Some(of_photons(point)) };
+        let flat = irradiance * diffuse.reflectance * FRAC_1_PI;
+        if point.frame.normal == normal {
+            return Some(flat);
+        }
+        // Irradiances are those of triangles: the photons tell the ratio for a bent normal.
+        let [bent, all] = [*point, SurfacePoint { frame: Frame::from_normal(normal), ..*point }]
+            .map(|point| of_photons(&point));
+        let ratio = |c: usize| if all[c] > 0.0 { flat[c] * bent[c] / all[c] } else { 0.0 };
+        Some(Rgb::new(ratio(0), ratio(1), ratio(2)))
     }
 
     /// Irradiance at `point`, the hit of a gather ray of length `distance`, and the radius of its discs.

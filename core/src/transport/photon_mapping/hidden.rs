@@ -13,8 +13,9 @@ use crate::transport::photon_mapping::visible_points::VisiblePointSampler;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::light::{
-    Continuation, LightPathState, LightWalk, MAX_CONTINUATION, PhotonBuffer, Vertex, Visitor,
+    Continuation, LightPathState, LightWalk, MAX_CONTINUATION, Vertex, Visitor,
 };
+use crate::transport::walk::photon_buffer::PhotonBuffer;
 use glam::Vec3;
 
 pub use crate::transport::walk::light::{PATHS_PER_TASK, VERTICES_PER_TASK};

@@ -18,6 +18,7 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::history::History;
 use crate::transport::walk::light_lanes::{LOBE, Lanes, ROULETTE, SCATTERING};
+use crate::transport::walk::shading_normal::{is_bent, sample_bent};
 use crate::transport::walk::sums::Sums;
 use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
 use bytemuck::{Pod, Zeroable};
@@ -134,6 +135,12 @@ pub(in crate::transport) trait Visitor {
     #[inline]
     fn is_apart(&self, _state: &LightPathState, _vertex: &Vertex) -> bool {
         false
+    }
+
+    /// True if densities of scattering at `vertex` enter the weights of the visitor.
+    #[inline]
+    fn has_densities(&self, _state: &LightPathState, _vertex: &Vertex) -> bool {
+        true
     }
 
     /// Called before the path leaves the vertex by `sample`, from the local direction `from`. The flag
@@ -261,6 +268,19 @@ impl<'a, F: Features> LightWalk<'a, F> {
         (sample, numbers.single(first + ROULETTE))
     }
 
+    /// As [`LightWalk::sample`], at a bent shading normal.
+    fn sample_bent<N: Numbers>(
+        context: &SceneContext<F>,
+        (numbers, first): (&N, u32),
+        (ray, hit): (&Ray, &Hit),
+        surface: (&SurfacePoint, &Bsdf),
+    ) -> (Option<(BsdfSample, bool)>, f32) {
+        let [u, v] = numbers.pair(first + SCATTERING);
+        let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
+        let sample = sample_bent::<F>(context, (ray, hit), surface, [u, v, lobe]);
+        (sample.map(|sample| (sample, false)), numbers.single(first + ROULETTE))
+    }
+
     /// One vertex at `hit` of `ray`; returns the next ray.
     fn step<V: Visitor, N: Numbers>(
         &self,
@@ -302,16 +322,20 @@ impl<'a, F: Features> LightWalk<'a, F> {
             return None;
         }
         let is_apart = F::GLOSSY && visitor.is_apart(state, &vertex);
-        let (sample, roulette) = if is_in_lanes && !is_apart {
-            let (sample, roulette) = lanes.sample::<F>(self.context.level, i);
-            (sample.map(|sample| (sample, sample.delta)), roulette)
-        } else {
-            Self::sample(numbers, first, (&bsdf, from), is_apart)
+        let is_free = !(is_apart || onward.specular_only || visitor.has_densities(state, &vertex));
+        let is_bent = is_free && is_bent(&point, &bsdf);
+        let (sample, roulette) = match is_in_lanes && !is_apart {
+            _ if is_bent => Self::sample_bent(&self.context, (numbers, first), (ray, hit), (&point, &bsdf)),
+            true => {
+                let (sample, roulette) = lanes.sample::<F>(self.context.level, i);
+                (sample.map(|sample| (sample, sample.delta)), roulette)
+            }
+            false => Self::sample(numbers, first, (&bsdf, from), is_apart),
         };
         let (sample, is_specular) =
             sample.filter(|(_, is_specular)| *is_specular || !onward.specular_only)?;
         let towards = point.frame.to_world(sample.direction);
-        if !point.sides_agree(sample.direction, towards) {
+        if !is_bent && !point.sides_agree(sample.direction, towards) {
             return None;
         }
         visitor.leave(state, &vertex, from, (&sample, is_specular));
@@ -319,7 +343,10 @@ impl<'a, F: Features> LightWalk<'a, F> {
         if power.max_element() <= 0.0 {
             return None;
         }
-        let next = scattered(power, &point, (direction, from), (towards, &sample));
+        let next = match is_bent {
+            true => power * sample.weight,
+            false => scattered(power, &point, (direction, from), (towards, &sample)),
+        };
         // Paths keep their power where possible: absorption ends paths instead.
         let continuation_probability = (next.max_element() / power.max_element()).min(onward.most);
         let continuation_probability =
@@ -354,34 +381,4 @@ fn scattered(
     }
     let flat = |way: Vec3| way.dot(point.geometric_normal).abs();
     power * (from.z * flat(towards) / (flat(direction) * sample.direction.z.abs()))
-}
-
-/// Photon memory of a task.
-pub(in crate::transport) struct PhotonBuffer<'p> {
-    photons: &'p mut [Photon],
-    count: usize,
-}
-
-impl<'p> PhotonBuffer<'p> {
-    pub(in crate::transport) fn new(photons: &'p mut [Photon]) -> Self {
-        Self { photons, count: 0 }
-    }
-
-    pub(in crate::transport) fn push(&mut self, photon: Photon, counters: &mut Counters) {
-        match self.photons.get_mut(self.count) {
-            Some(slot) => {
-                *slot = photon;
-                self.count += 1;
-            }
-            None => counters.dropped.unfinished += 1,
-        }
-    }
-
-    /// Fills the rest with photons without position, which a map rejects.
-    pub(in crate::transport) fn finish(self) {
-        let Self { photons, count } = self;
-        if let Some(rest) = photons.get_mut(count..) {
-            rest.fill(Photon::NONE);
-        }
-    }
 }

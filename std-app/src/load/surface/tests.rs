@@ -60,7 +60,9 @@ fn pm_and_illum_make_metals_and_mirrors() {
     assert_eq!(surface("Ks 0.9 0.8 0.7\nillum 3\nPr 0\nPm 1"), mirror);
     assert_eq!(surface("Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3\nPr 0\nPm 1\nNs 1000"), mirror);
     assert_eq!(surface("Kd 0.9 0.8 0.7\nillum 3"), mirror);
-    assert_eq!(surface("Kd 0.9 0.8 0.7\nPm 1\nPr 0"), mirror);
+    // The smooth end of a metal's roughness, which reflects more at grazing angles.
+    let smooth_metal = Surface::Conductor { reflectance: rgb(0.9, 0.8, 0.7), roughness: 0.0.into() };
+    assert_eq!(surface("Kd 0.9 0.8 0.7\nPm 1\nPr 0"), smooth_metal);
     let smooth = Surface::Conductor { reflectance: rgb(0.95, 0.95, 0.95), roughness: 0.0.into() };
     assert_eq!(surface("Kd 0.01 0.01 0.01\nKs 0.95\nNs 1000\nillum 5"), smooth);
     let Surface::Glossy { metallic, .. } = surface("Kd 1 1 1\nKs 0.04\nPm 0.5") else { panic!("not glossy") };
