@@ -74,13 +74,15 @@
 //! - [`estimate`]: the error of a picture. [`census`]: the kinds of things in a scene, and the code they
 //!   need.
 //! - [`transport`]: subpaths, path tracing, photon tracing, gathering. [`method`]: the methods of rendering.
-//! - [`renderer`]: the front of all methods.
+//! - [`audit`]: bias by path tracing of some pixels; noise, blur and bias together.
+//! - [`renderer`]: the front of all methods, rounds and stop rules.
 #![no_std]
 #![forbid(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
+pub mod audit;
 pub mod bsdf;
 pub mod bvh;
 pub mod cache;

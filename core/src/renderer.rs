@@ -1,11 +1,15 @@
 //! Renderer of a picture: any method, in the caller's memory, on the caller's threads.
 
+mod audited;
 mod error;
 mod of_features;
+mod rounds;
 mod settings;
 
+pub use audited::OutOfReach;
 pub use error::RenderError;
 pub use of_features::FeatureRenderer;
+pub use rounds::{Estimates, Plan, Rounds, Stop, StopRule};
 pub use settings::{RequiredMemory, Settings, Until};
 
 use crate::Rgb;

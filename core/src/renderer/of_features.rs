@@ -1,17 +1,18 @@
 //! Renderer compiled for one set of features.
 
 use super::{RenderError, RequiredMemory, Settings, Until};
+use crate::audit::ErrorReport;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
-use crate::estimate::{BiasEstimate, ErrorEstimate, TileBlur};
-use crate::film::{Film, PIXELS_PER_TILE};
+use crate::estimate::ErrorEstimate;
+use crate::film::Film;
 use crate::findings::Findings;
 use crate::light::LightSampler;
 use crate::memory::{Arena, Buffer, OutOfMemory};
 use crate::method::cached_paths::KeptCaches;
 use crate::method::environment_visibility::learn;
 use crate::method::{
-    Attempt, ChosenMethod, Executor, MethodKind, MethodPlan, MethodSetup, PilotSize, RenderContext,
+    Attempt, ChosenMethod, Executor, Loop, MethodKind, MethodPlan, MethodSetup, PilotSize, RenderContext,
     RenderMethod, RenderState, Round,
 };
 use crate::scene::Scene;
@@ -127,11 +128,8 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
 
     /// See [`Renderer::error`](super::Renderer::error).
     pub fn error(&self) -> Option<ErrorEstimate> {
-        let film = &self.state.film;
-        let noise = ErrorEstimate::of_film(film, self.state.is_correlated)?;
-        let mean = film.mean_radiance()?;
-        let tiles = film.pixels().chunks(PIXELS_PER_TILE).map(|tile| TileBlur::of(tile, mean));
-        Some(BiasEstimate::of_blur(tiles).map_or(noise, |blur| noise.with_bias(blur)))
+        let RenderState { film, is_correlated, .. } = &self.state;
+        ErrorReport::of_film(film, *is_correlated, |_, _, _| None, &mut Loop::new(&mut [])).error()
     }
 
     /// Sums of the samples.

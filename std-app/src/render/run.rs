@@ -1,6 +1,6 @@
 //! A render from its settings to its result: checks, structures, method, and the rounds of the picture.
 
-use super::audit::Audit;
+use super::audit::ThreadedAudit;
 use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
 use super::history::Clock;
@@ -124,7 +124,7 @@ impl WithFeatures for Render<'_> {
             let mut own = memory.within();
             let attempt = method::set_up::<F>(plan, &setup, &mut own).and_then(|attempt| match attempt {
                 Attempt::Ready(renderer) => {
-                    let audit = Audit::new::<F>(&setup, &mut own, renderer.chosen())?;
+                    let audit = ThreadedAudit::<F>::new(&setup, &mut own, renderer.chosen())?;
                     Ok(Ok((renderer, audit)))
                 }
                 Attempt::Instead(better) => Ok(Err(better)),
@@ -149,6 +149,7 @@ impl WithFeatures for Render<'_> {
                 setup,
                 state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
                 audit,
+                memory: &mut own,
                 identity: identity(method),
                 resumed: resumed.take(),
                 clock: &mut clock,

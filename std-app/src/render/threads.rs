@@ -63,6 +63,12 @@ impl<'w> Workers<'w> {
         self.fork.0.install(work)
     }
 
+    /// Runs `work` with an executor of estimates of the error, which have no working memory.
+    pub(super) fn estimating<T>(&self, work: impl FnOnce(&mut Threads) -> T) -> T {
+        let mut scratch = vec![Vec::new(); self.count()];
+        work(&mut Threads::new(self, &mut scratch).until(End::Never))
+    }
+
     /// Builds the BVH of `mesh` on all threads.
     pub(super) fn build_bvh<'m>(
         &self,
