@@ -6,7 +6,7 @@
 //! | type | purpose |
 //! |---|---|
 //! | [`Scene`] | borrowed views of the triangles, materials, textures, lights and the camera |
-//! | [`Settings`] | size of the picture, [`Method`] with its options, seed |
+//! | [`Settings`] | size of the picture, [`Method`] with its options, seed, audit |
 //! | [`Renderer`] | a picture in progress: [`Renderer::step`], [`Renderer::error`], [`Renderer::picture`] |
 //! | [`Arena`] | the caller's bytes, of which [`Renderer::required_memory`] says the number |
 //! | [`Executor`] | the caller's threads; [`Loop`] is one thread |
