@@ -45,7 +45,8 @@ pub(super) fn footprint([width, height]: [u32; 2]) -> Footprint {
 #[repr(C)]
 pub(super) struct Ranked {
     region: u32,
-    /// Ascending in one region and descending in the next, so that adjacent strata of two regions are similar.
+    /// Ascending in one region and descending in the next, so that adjacent strata of two regions are
+    /// similar.
     brightness: f32,
     pub(super) pixel: [u32; 2],
 }

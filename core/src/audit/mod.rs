@@ -17,5 +17,5 @@ pub use pixels::{AuditState, AuditedPixels};
 pub use region::{Region, Regions};
 pub use report::{ErrorReport, NoiseAndBlur};
 pub use risks::Risks;
-pub use run::{Audit, AuditSettings, Spent, audit_fraction};
+pub use run::{Audit, AuditSettings, ExtraTime, Spent, audit_fraction};
 pub use verdict::{AuditWork, Audited};

@@ -135,12 +135,12 @@ impl<'m> AuditedPixels<'m> {
         Self::footprint(count).slice::<Merging>(count)
     }
 
-    /// Audit of the whole picture `film`, whose mean is `mean`, from the audits of all shards: strata of shards
-    /// are strata of the picture. `None` if a shard has no samples, or pixels that are not its own.
+    /// Audit of the whole picture `film`, whose mean is `mean`, from the audits of all shards: strata of
+    /// shards are strata of the picture. `None` if a shard has no samples, or pixels that are not its own.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `arena` has less than [`AuditedPixels::merged_footprint`] bytes for the pixels of
-    /// all shards.
+    /// [`OutOfMemory`] where `arena` has less than [`AuditedPixels::merged_footprint`] bytes for the pixels
+    /// of all shards.
     pub fn merged(
         shards: &[(Shard, AuditState)],
         film: &Film,

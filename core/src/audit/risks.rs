@@ -53,7 +53,7 @@ impl<'m> Risks<'m> {
     /// pixels. `None` if the executor ends early.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `arena` has less than [`Risks::footprint`] bytes.
+    /// [`OutOfMemory`] where `arena` has less memory than the risks and their estimate take.
     pub fn of_caches<F: Features>(
         tracer: &PathIntegrator<F>,
         caches: [&IrradianceCache; 2],

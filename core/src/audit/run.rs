@@ -68,6 +68,14 @@ pub struct Spent<'c> {
     pub clock: &'c dyn Fn() -> f64,
 }
 
+/// Time of an audit that continues alone.
+pub struct ExtraTime<'t> {
+    /// True if it may take the seconds that it expects.
+    pub may_take: &'t mut dyn FnMut(f64) -> bool,
+    /// Seconds since any fixed time; without a clock, time stands still at 0.
+    pub clock: &'t dyn Fn() -> f64,
+}
+
 /// An audit in progress.
 pub struct Audit<'m, F> {
     tracer: PathIntegrator<'m, F>,
@@ -267,15 +275,14 @@ impl<'m, F: Features> Audit<'m, F> {
         self.pixels.count = many;
     }
 
-    /// Takes a quarter more samples in steps while `may` allows the expected seconds; returns whether all
-    /// were taken.
+    /// Takes a quarter more samples in steps while its `time` allows; returns whether all were taken.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the scratch of `executor` is smaller than [`Audit::scratch`].
     pub fn extend(
         &mut self,
         method: &mut (impl AuditedMethod<F> + ?Sized),
-        (may, clock): (&mut dyn FnMut(f64) -> bool, &dyn Fn() -> f64),
+        time: &mut ExtraTime,
         executor: &mut impl Executor,
     ) -> Result<bool, OutOfMemory> {
         let end = |taken: u32| taken.saturating_add(taken / 4).checked_next_multiple_of(STEP);
@@ -284,10 +291,10 @@ impl<'m, F: Features> Audit<'m, F> {
             let AuditWork { samples: taken, seconds, .. } = self.pixels.work;
             let each = seconds / f64::from(taken.max(1));
             let samples = ((MAX_RUN_SECONDS / each) as u32 / STEP * STEP).max(STEP).min(end - taken);
-            if !may(each * f64::from(samples)) {
+            if !(time.may_take)(each * f64::from(samples)) {
                 return Ok(false);
             }
-            let start = clock();
+            let start = (time.clock)();
             let mut is_complete = false;
             method.lend_photons(&mut |photons| {
                 is_complete = self.run(taken..taken + samples, photons, executor)?;
@@ -296,7 +303,7 @@ impl<'m, F: Features> Audit<'m, F> {
             if !is_complete {
                 return Ok(false);
             }
-            self.pixels.work.seconds += clock() - start;
+            self.pixels.work.seconds += (time.clock)() - start;
         }
         Ok(true)
     }

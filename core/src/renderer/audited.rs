@@ -2,7 +2,7 @@
 //! when the requested error is out of reach.
 
 use super::rounds::Rounds;
-use crate::audit::{Audit, AuditedMethod, ErrorReport};
+use crate::audit::{Audit, AuditedMethod, ErrorReport, ExtraTime};
 use crate::bsdf::Features;
 use crate::memory::OutOfMemory;
 use crate::method::{Executor, RenderState};
@@ -18,8 +18,8 @@ pub enum OutOfReach {
 
 impl Rounds {
     /// Focuses an audit after its first samples. Then it continues alone while only the estimate of the bias
-    /// is too uncertain for an error target, and while `time` allows the seconds that it expects: by an
-    /// answer, and a clock. Without `time` it does not continue. Returns the report with its result.
+    /// is too uncertain for an error target, and while `time` allows. Without `time` it does not continue.
+    /// Returns the report with its result.
     ///
     /// # Errors
     /// Those of [`Audit::extend`].
@@ -27,16 +27,16 @@ impl Rounds {
         &self,
         (audit, method): (&mut Audit<F>, &mut (impl AuditedMethod<F> + ?Sized)),
         (state, report): (&RenderState, ErrorReport),
-        time: Option<(&mut dyn FnMut(f64) -> bool, &dyn Fn() -> f64)>,
+        time: Option<ExtraTime>,
         executor: &mut E,
     ) -> Result<ErrorReport, OutOfMemory> {
         if let Some(audited) = &report.audited {
             audit.reduce_pixels(audited, (state.counters.all_rays(), self.spp()));
         }
         let mut report = report;
-        let Some((may, clock)) = time else { return Ok(report) };
+        let Some(mut time) = time else { return Ok(report) };
         while report.audited.as_ref().is_some_and(|audited| self.waits_for(audited)) {
-            if !audit.extend(method, (&mut *may, clock), executor)? {
+            if !audit.extend(method, &mut time, executor)? {
                 break;
             }
             report = report.judged_anew(&state.film, audit, executor);

@@ -2,7 +2,7 @@
 
 use super::rounds::{Estimates, Rounds, Stop};
 use super::{RenderError, RequiredMemory, Settings, Until};
-use crate::audit::{Audit, AuditSettings, ErrorReport, Spent, audit_fraction};
+use crate::audit::{Audit, AuditSettings, ErrorReport, ExtraTime, Spent, audit_fraction};
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
 use crate::film::Film;
@@ -134,7 +134,9 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             Until::Error(wanted) => self.render_until(wanted, executor)?,
         }
         let Self { audit, state, .. } = self;
-        if let Some((audit, mean)) = audit.as_mut().zip(state.film.mean_radiance(executor)) {
+        if let Some(audit) = audit
+            && let Some(mean) = state.film.mean_radiance(executor)
+        {
             audit.compare(&state.film, mean, executor);
         }
         Ok(())
@@ -174,8 +176,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         let Self { method, state, audit, is_audit_open, .. } = self;
         let report = ErrorReport::new(state, audit.as_mut(), executor);
         let Some(audit) = audit else { return Ok(report) };
-        let (mut may, clock) = (|_: f64| true, || NO_CLOCK);
-        let time: (&mut dyn FnMut(f64) -> bool, &dyn Fn() -> f64) = (&mut may, &clock);
+        let time = ExtraTime { may_take: &mut |_| true, clock: &|| NO_CLOCK };
         rounds.extend_audit((audit, method), (state, report), is_audit_open.then_some(time), executor)
     }
 

@@ -14,7 +14,7 @@ use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds}
 use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use halflight_core::audit::{ErrorReport, Spent};
+use halflight_core::audit::{ErrorReport, ExtraTime, Spent};
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::findings::{Findings, Value};
@@ -243,14 +243,13 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         let Some(audit) = audit else { return Ok(report) };
         let (left, start) = (settings.stop.seconds.map(|limit| limit - self.estimating), Instant::now());
         let error = report.error();
-        let mut may = |cost: f64| {
+        let mut may_take = |cost: f64| {
             let known = progress_of(rounds, clock.seconds(), error);
             clock.pause(|| progress(&known));
             let is_time = left.is_none_or(|left| clock.seconds() + cost < left);
             is_time && !interrupt.load(Ordering::Relaxed)
         };
-        let elapsed = || start.elapsed().as_secs_f64();
-        let time: (&mut dyn FnMut(f64) -> bool, &dyn Fn() -> f64) = (&mut may, &elapsed);
+        let time = ExtraTime { may_take: &mut may_take, clock: &|| start.elapsed().as_secs_f64() };
         let (audit, mut executor) = audit.at_work(workers);
         let time = settings.audit.is_none().then_some(time);
         Ok(rounds.extend_audit((audit, renderer), (state, report), time, &mut executor)?)
