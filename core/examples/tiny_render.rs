@@ -38,7 +38,8 @@ pub use room::fingerprint;
 /// Renders eight samples of each pixel of the room by `method`, row by row from the top, all in `memory`.
 pub fn render(method: Method, memory: &mut [Line], pixels: &mut [Rgb]) -> Result<(), RenderError> {
     let scene = room::with_metal_wall();
-    let settings = Settings { level: Level::BASELINE, ..Settings::new([SIZE as u32; 2]).with_method(method) };
+    let settings = Settings::new([SIZE as u32; 2]).with_method(method);
+    let settings = Settings { level: Level::BASELINE, audit: Some(0.0), ..settings };
     let mut arena = Arena::over(memory);
     let scratch = Renderer::required_memory(&scene, &settings).scratch.min(arena.available() / 2);
     let mut executor = Loop::new(arena.slice(scratch)?);

@@ -6,7 +6,7 @@
 //! | type | purpose |
 //! |---|---|
 //! | [`Scene`] | borrowed views of the triangles, materials, textures, lights and the camera |
-//! | [`Settings`] | size of the picture, [`Method`] with its options, seed |
+//! | [`Settings`] | size of the picture, [`Method`] with its options, seed, audit |
 //! | [`Renderer`] | a picture in progress: [`Renderer::step`], [`Renderer::error`], [`Renderer::picture`] |
 //! | [`Arena`] | the caller's bytes, of which [`Renderer::required_memory`] says the number |
 //! | [`Executor`] | the caller's threads; [`Loop`] is one thread |
@@ -76,6 +76,8 @@ pub mod renderer;
 pub mod scene;
 
 // Layers for the program, the tests and fuzzing. They may change with any version.
+#[doc(hidden)]
+pub mod audit;
 #[doc(hidden)]
 pub mod bsdf;
 #[doc(hidden)]

@@ -1,14 +1,19 @@
 //! Renderer of a picture: any method, in the caller's memory, on the caller's threads.
 
+mod audited;
 mod error;
 mod of_features;
+mod rounds;
 mod settings;
 
+pub use audited::OutOfReach;
 pub use error::RenderError;
 pub use of_features::FeatureRenderer;
+pub use rounds::{Estimates, Plan, Rounds, Stop, StopRule};
 pub use settings::{RequiredMemory, Settings, Until};
 
 use crate::Rgb;
+use crate::audit::{Audited, ErrorReport};
 use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::census::{Census, FeatureSet};
 use crate::estimate::ErrorEstimate;
@@ -76,7 +81,8 @@ impl<'a> Renderer<'a> {
         Ok(Self { build })
     }
 
-    /// Adds samples `until` the given end, or until the executor is over.
+    /// Adds samples `until` the given end, or until the executor is over. A biased picture is audited in step
+    /// with it. An error that bias or a noise floor keeps out of reach ends the step as well.
     ///
     /// # Errors
     /// [`RenderError::Memory`] where the scratch of `executor` is smaller than that of
@@ -85,10 +91,21 @@ impl<'a> Renderer<'a> {
         of_build!(&mut self.build, renderer => renderer.step(executor, until))
     }
 
-    /// Error of the picture: noise by the halves of the film, and blur by photons. `None` below four samples
-    /// per pixel and for a black picture.
+    /// Error of the picture: noise by the halves of the film, and bias by the audit or by the blur of
+    /// photons. `None` below four samples per pixel and for a black picture.
     pub fn error(&self) -> Option<ErrorEstimate> {
-        of_build!(&self.build, renderer => renderer.error())
+        self.error_report().error()
+    }
+
+    /// Result of the audit at the end of the last step. `None` of a method without bias, unless
+    /// [`Settings::audit`] asks for one, and as long as [`Renderer::error`] is.
+    pub fn audit(&self) -> Option<Audited> {
+        self.error_report().audited
+    }
+
+    /// Parts of the error.
+    pub fn error_report(&self) -> ErrorReport {
+        of_build!(&self.build, renderer => renderer.error_report())
     }
 
     /// Mean radiance of each pixel, row by row from the top.
@@ -116,3 +133,6 @@ impl<'a> Renderer<'a> {
         of_build!(&self.build, renderer => renderer.findings())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -121,7 +121,7 @@ fn the_audit_merges_the_same_photons() {
         let fine = cached(&scene, 128, |s| (s.seed, s.audit, s.stop.error) = (seed, None, Some(1e-9)));
         let audit = fine.audit.as_ref().unwrap();
         println!("seed {seed}: {:?} {:?} {:?}", fine.error, audit.bias, audit.whole);
-        assert!(audit.has_photons && audit.bias.lower == 0.0);
+        assert!(audit.work.has_photons && audit.bias.lower == 0.0);
         // Fireflies of paths hide a small bias in the pictures of other seeds.
         if seed == 3 {
             assert!(!audit.is_biased() && audit.bias.detectable < 0.02);
@@ -136,6 +136,6 @@ fn the_audit_merges_the_same_photons() {
         });
         let audit = coarse.audit.as_ref().unwrap();
         println!("seed {seed}: {:?} {:?}", audit.bias, audit.whole);
-        assert!(audit.has_photons && audit.is_biased());
+        assert!(audit.work.has_photons && audit.is_biased());
     }
 }

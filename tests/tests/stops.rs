@@ -77,7 +77,7 @@ fn an_audit_that_finds_no_light_reports_no_bias() {
         let flag = AtomicBool::new(false);
         let result = render::render(&glass_cube(false).scene(), &settings, &mut |_| (), &flag).unwrap();
         let (audit, error) = (result.audit.unwrap(), result.error.unwrap());
-        assert!(audit.is_blind && audit.unseen > 0.9 && !audit.is_biased(), "{audit:?}");
+        assert!(audit.is_blind && audit.work.unseen > 0.9 && !audit.is_biased(), "{audit:?}");
         assert!(result.ending == Ending::Done && result.spp < 512 && error.upper <= 0.02, "{error:?}");
     }
 }

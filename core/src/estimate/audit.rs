@@ -12,6 +12,7 @@ use super::metric::{RELMSE_OFFSET, ROUNDING};
 use super::student::NORMAL_95 as Z;
 use crate::Rgb;
 use crate::film::Pixel;
+use bytemuck::{Pod, Zeroable};
 use libm::{cbrt, fabs, hypot, sqrt};
 
 /// Divisor of the filtered picture that bounds R in denominators from below. R comes from the part of the
@@ -24,7 +25,8 @@ const FILTERED_DIVISOR: f64 = 4.0;
 const NORMAL_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
 
 /// Result of an audited pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct PixelBias {
     /// Estimate of the squared bias over R² + 0.01 m², averaged over channels; may be negative.
     pub bias: f64,

@@ -20,5 +20,6 @@ pub use filter::{filtered, filtered_pixel};
 pub use interval::ErrorEstimate;
 pub(crate) use metric::RELMSE_OFFSET;
 pub use metric::{Difference, mse, relmse, rmse};
+pub use regions::ErrorSums;
 pub use student::{NORMAL_95, student_quantile};
 pub use tile::{TileError, TileLight};

@@ -2,7 +2,7 @@
 
 use super::bidirectional::Bidirectional;
 use super::cached_paths::CachedPathTracing;
-use super::caustics::{CausticPathTracing, CausticPhotons};
+use super::caustics::CausticPathTracing;
 use super::executor::Executor;
 use super::instant_radiosity::InstantRadiosity;
 use super::metropolis::Metropolis;
@@ -12,7 +12,6 @@ use super::{LastMaps, MethodKind, RenderMethod, Round};
 use crate::bsdf::Features;
 use crate::findings::Findings;
 use crate::memory::OutOfMemory;
-use crate::transport::CausticMerging;
 
 /// A method with its structures in memory.
 pub enum AnyMethod<'a, F> {
@@ -58,28 +57,6 @@ macro_rules! of_any {
 }
 
 impl<'a, F: Features> ChosenMethod<'a, F> {
-    /// Calls `work` with the caustic photons that paths without records may use now, if there are any.
-    ///
-    /// # Errors
-    /// Those of [`CausticPhotons::lend`].
-    pub fn lend_photons<T>(
-        &mut self,
-        work: impl FnOnce(Option<CausticMerging>) -> T,
-    ) -> Result<T, OutOfMemory> {
-        match self.caustic_photons() {
-            Some(photons) => photons.lend(work),
-            None => Ok(work(None)),
-        }
-    }
-
-    /// Photons beside records: those of path tracing belong to its picture.
-    fn caustic_photons(&mut self) -> Option<&mut CausticPhotons<'a>> {
-        match &mut self.method {
-            AnyMethod::Cached(cached) => cached.photons(),
-            _ => None,
-        }
-    }
-
     /// The caches, if the method has some.
     pub fn cached(&self) -> Option<&CachedPathTracing<'a, F>> {
         match &self.method {

@@ -75,13 +75,12 @@ impl Sums {
 }
 
 impl HiddenLight {
-    /// Memory that [`HiddenLight::measure`] borrows.
-    pub fn footprint(context: &RenderContext) -> Footprint {
-        let (lights, rays) = (context.lights, raster(context).rays());
-        EmissionSampler::footprint(lights.count())
-            .and(GuideStats::footprint(lights.count()))
-            .and(GuideStats::guide_footprint(lights.count()))
-            .slice::<f32>(rays)
+    /// Memory that [`HiddenLight::measure`] borrows for a picture of `size` in a scene of so many lights.
+    pub fn footprint(lights: usize, size: [u32; 2]) -> Footprint {
+        EmissionSampler::footprint(lights)
+            .and(GuideStats::footprint(lights))
+            .and(GuideStats::guide_footprint(lights))
+            .slice::<f32>(VisiblePointSampler::new(size).rays())
             .and(PhotonMapStore::footprint(TASKS * VERTICES_PER_TASK))
     }
 
@@ -106,7 +105,8 @@ impl HiddenLight {
         memory: &mut impl MemorySource<'m>,
         executor: &mut impl Executor,
     ) -> Result<Option<Self>, OutOfMemory> {
-        let footprint = Self::footprint(context);
+        let size = [context.settings.width, context.settings.height];
+        let footprint = Self::footprint(context.lights.count(), size);
         if !Self::is_possible::<F>(context) || !memory.has(footprint) {
             return Ok(None);
         }

@@ -11,6 +11,8 @@ pub enum RenderError {
     Size,
     /// The shard does not exist.
     Shard,
+    /// The fraction of the audit is negative, 1 or more, or no number.
+    Audit,
     /// This triangle has a vertex or a material that does not exist; 0 also where normals or texture
     /// coordinates are not as many as positions.
     Triangle(usize),
@@ -23,6 +25,7 @@ impl fmt::Display for RenderError {
         match self {
             RenderError::Size => write!(f, "a picture has 1 to 2^28 pixels"),
             RenderError::Shard => write!(f, "the shard does not exist"),
+            RenderError::Audit => write!(f, "the fraction of an audit is from 0 to below 1"),
             RenderError::Triangle(index) => {
                 write!(f, "triangle {index} refers to something that does not exist")
             }

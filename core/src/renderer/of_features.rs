@@ -1,32 +1,46 @@
 //! Renderer compiled for one set of features.
 
+use super::rounds::{Estimates, Rounds, Stop};
 use super::{RenderError, RequiredMemory, Settings, Until};
+use crate::audit::{Audit, AuditSettings, ErrorReport, ExtraTime, MethodAtWork, Spent, audit_fraction};
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
-use crate::estimate::{BiasEstimate, ErrorEstimate, TileBlur};
-use crate::film::{Film, PIXELS_PER_TILE};
+use crate::film::Film;
 use crate::findings::Findings;
 use crate::light::LightSampler;
 use crate::memory::{Arena, Buffer, OutOfMemory};
 use crate::method::cached_paths::KeptCaches;
+use crate::method::caustics;
 use crate::method::environment_visibility::learn;
+use crate::method::hidden_light::HiddenLight;
 use crate::method::{
-    Attempt, ChosenMethod, Executor, MethodKind, MethodPlan, MethodSetup, PilotSize, RenderContext,
+    Attempt, ChosenMethod, Executor, Loop, MethodKind, MethodPlan, MethodSetup, PilotSize, RenderContext,
     RenderMethod, RenderState, Round,
 };
 use crate::scene::Scene;
 
+/// Reading of a clock that does not exist.
+const NO_CLOCK: f64 = 0.0;
+
 /// Samples of a tile between two questions whether the executor is over.
 const STEP: u32 = 8;
 
-/// Samples at the first estimate of the error, and fewest at which it may end a picture.
-const FIRST_ESTIMATE: u32 = 4;
-const FEWEST_FOR_ERROR: u32 = 16;
+/// Samples at which an audit begins: one for each quarter of the film.
+const FIRST_OF_AUDIT: u32 = 4;
 
 /// A [`Renderer`](super::Renderer) of scenes that have no other features than `F`.
 pub struct FeatureRenderer<'a, F> {
     method: ChosenMethod<'a, F>,
     state: RenderState<'a>,
+    audit: Option<Audit<'a, F>>,
+    /// Light that the method cannot find.
+    hidden: Option<HiddenLight>,
+    /// True if the audit may continue alone, since its fraction of the work is not requested.
+    is_audit_open: bool,
+    /// Memory that the audit borrows.
+    memory: Buffer<'a>,
+    /// Number of samples and upper end of the first estimate of noise.
+    first_noise: Option<(u32, f64)>,
 }
 
 impl<'a, F: Features> FeatureRenderer<'a, F> {
@@ -39,8 +53,25 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         let bvh = Bvh::footprint(scene.mesh.triangles.len());
         let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let film = RenderState::footprint(width, height);
-        let structures = bvh.and(lights).and(film).and(method).bytes();
-        RequiredMemory { structures, scratch: scratch.bytes() }
+        // Prepasses may choose a biased method.
+        let is_biased = kind.is_none_or(MethodKind::is_biased);
+        let (audit, audit_scratch) = match audit_fraction(settings.audit, is_biased) {
+            Some(_) => {
+                let lights = LightSampler::count_in(scene);
+                (Audit::<F>::reserve(settings.size, lights, is_biased), Audit::<F>::scratch())
+            }
+            None => Default::default(),
+        };
+        // Light is hidden where it has no extent.
+        let (hidden, hidden_scratch) = match !scene.lights.is_empty() && caustics::are_possible(scene) {
+            true => {
+                let hidden = HiddenLight::footprint(LightSampler::count_in(scene), settings.size);
+                (hidden, MethodAtWork::scratch::<F>())
+            }
+            false => Default::default(),
+        };
+        let structures = bvh.and(lights).and(film).and(method).and(audit).and(hidden).bytes();
+        RequiredMemory { structures, scratch: scratch.or(audit_scratch).or(hidden_scratch).bytes() }
     }
 
     /// See [`Renderer::new`](super::Renderer::new).
@@ -73,8 +104,11 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             options: settings.method.options(),
             goal: settings.goal,
             shards: settings.shard.count,
-            reserve: [0; 2],
-            is_audited: true,
+            reserve: [false, true].map(|is_biased| {
+                let reserve = Audit::<F>::reserve(settings.size, lights.count(), is_biased).bytes();
+                audit_fraction(settings.audit, is_biased).map_or(0, |_| reserve)
+            }),
+            is_audited: audit_fraction(settings.audit, true).is_some(),
             kept: KeptCaches::default(),
             widens: true,
             has_fixed_records: false,
@@ -86,8 +120,19 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
                 Attempt::Instead(better) => plan = better,
             }
         };
-        let is_correlated = method.kind.shares();
-        Ok(Self { method, state: RenderState { is_correlated, ..state } })
+        let (context, kind) = (&setup.context, method.kind);
+        let audit = match audit_fraction(settings.audit, kind.is_biased()) {
+            Some(fraction) => {
+                let of_rays = AuditSettings { fraction, shard: settings.shard, by_clock: false };
+                Some(Audit::new(context, kind, of_rays, &mut memory, executor)?)
+            }
+            None => None,
+        };
+        let at_work = MethodAtWork { kind, options: &setup.options, findings: &method.findings() };
+        let hidden = at_work.hidden_light::<F>(context, settings.goal.samples, &mut memory, executor)?;
+        let state = RenderState { is_correlated: kind.shares(), ..state };
+        let is_audit_open = settings.audit.is_none();
+        Ok(Self { method, state, audit, hidden, is_audit_open, memory, first_noise: None })
     }
 
     /// See [`Renderer::step`](super::Renderer::step).
@@ -96,42 +141,81 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
     /// Those of [`Renderer::step`](super::Renderer::step).
     pub fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
         match until {
-            Until::Samples(target) => self.add_samples(executor, target),
-            Until::Error(wanted) => {
-                let is_reached = |error: ErrorEstimate| error.upper <= wanted;
-                while self.samples() < FEWEST_FOR_ERROR || !self.error().is_some_and(is_reached) {
-                    let samples = self.samples();
-                    self.add_samples(executor, self.next_estimate(wanted))?;
-                    if executor.is_over() || self.samples() == samples {
-                        break;
-                    }
-                }
-                Ok(())
+            Until::Samples(target) => {
+                self.add_samples(executor, target)?;
+                self.step_audit(executor)?;
             }
+            Until::Error(wanted) => self.render_until(wanted, executor)?,
+        }
+        let Self { audit, state, .. } = self;
+        if let Some(audit) = audit
+            && let Some(mean) = state.film.mean_radiance(executor)
+        {
+            audit.compare(&state.film, mean, executor);
+        }
+        Ok(())
+    }
+
+    /// Adds samples until the error is at most `wanted`, or out of reach.
+    fn render_until(&mut self, wanted: f64, executor: &mut impl Executor) -> Result<(), RenderError> {
+        let stop = Stop { error: Some(wanted), ..Stop::default() };
+        let known = Estimates { first_noise: self.first_noise, ..Estimates::default() };
+        let mut rounds = Rounds::new(stop).resumed(self.samples(), 0, NO_CLOCK, known);
+        loop {
+            if rounds.estimate_is_due() {
+                let report = self.estimate(&rounds, executor)?;
+                let lost = rounds.out_of_reach(&report, self.method.kind.converges());
+                rounds.estimated(report.error());
+                self.first_noise = rounds.estimates().first_noise;
+                if lost.is_some() {
+                    return Ok(());
+                }
+            }
+            let Some(plan) = rounds.next(NO_CLOCK, 0.0) else { return Ok(()) };
+            self.add_samples(executor, plan.target)?;
+            if executor.is_over() || self.samples() == rounds.spp() {
+                return Ok(());
+            }
+            rounds.completed(self.samples(), NO_CLOCK);
         }
     }
 
+    /// Takes the samples of the audit that are due, and estimates the error.
+    fn estimate<E: Executor>(
+        &mut self,
+        rounds: &Rounds,
+        executor: &mut E,
+    ) -> Result<ErrorReport, OutOfMemory> {
+        self.step_audit(executor)?;
+        let Self { method, state, audit, hidden, is_audit_open, .. } = self;
+        let report = ErrorReport::new(state, audit.as_mut(), executor);
+        let report = report.lacking(hidden.as_ref(), &state.film);
+        let Some(audit) = audit else { return Ok(report) };
+        let time = ExtraTime { may_take: &mut |_| true, clock: &|| NO_CLOCK };
+        rounds.extend_audit((audit, method), (state, report), is_audit_open.then_some(time), executor)
+    }
+
+    /// Takes the samples of the audit that are due.
+    fn step_audit(&mut self, executor: &mut impl Executor) -> Result<(), OutOfMemory> {
+        let is_due = self.samples() >= FIRST_OF_AUDIT;
+        let Self { method, state, audit, memory, .. } = self;
+        let Some(audit) = audit.as_mut().filter(|_| is_due) else { return Ok(()) };
+        let rays = state.counters.all_rays();
+        let spent = Spent { rays, seconds: NO_CLOCK, left: None, clock: &|| NO_CLOCK };
+        audit.step(method, (&state.film, &spent), memory, executor)
+    }
+
     fn add_samples(&mut self, executor: &mut impl Executor, target: u32) -> Result<(), RenderError> {
-        let Self { method, state } = self;
+        let Self { method, state, .. } = self;
         Ok(method.round(&mut Round { executor, state, target, step: STEP })?)
     }
 
-    /// Samples at which the error can be `wanted` at the earliest: it falls at best with the squared number
-    /// of samples, while its interval narrows.
-    fn next_estimate(&self, wanted: f64) -> u32 {
-        let samples = self.samples();
-        let growth = self.error().map_or(2.0, |error| libm::cbrt(error.upper / wanted));
-        let next = (f64::from(samples) * growth.clamp(1.0 + 1.0 / 32.0, 2.0)) as u32;
-        next.max(samples + 1).max(FIRST_ESTIMATE).next_multiple_of(4)
-    }
-
-    /// See [`Renderer::error`](super::Renderer::error).
-    pub fn error(&self) -> Option<ErrorEstimate> {
-        let film = &self.state.film;
-        let noise = ErrorEstimate::of_film(film, self.state.is_correlated)?;
-        let mean = film.mean_radiance()?;
-        let tiles = film.pixels().chunks(PIXELS_PER_TILE).map(|tile| TileBlur::of(tile, mean));
-        Some(BiasEstimate::of_blur(tiles).map_or(noise, |blur| noise.with_bias(blur)))
+    /// See [`Renderer::error_report`](super::Renderer::error_report).
+    pub fn error_report(&self) -> ErrorReport {
+        let RenderState { film, is_correlated, .. } = &self.state;
+        let audit = |_: f64, noise, _: &mut Loop| self.audit.as_ref()?.verdict(noise);
+        let report = ErrorReport::of_film(film, *is_correlated, audit, &mut Loop::new(&mut []));
+        report.lacking(self.hidden.as_ref(), film)
     }
 
     /// Sums of the samples.
@@ -151,7 +235,8 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
 
     /// Decisions and numbers of the parts of the method.
     pub fn findings(&self) -> Findings {
-        self.method.findings()
+        let lacking = self.hidden.as_ref().map(|hidden| hidden.lacking_in(&self.state.film).finding());
+        self.method.findings().and(lacking)
     }
 }
 

@@ -35,6 +35,9 @@ pub struct Settings {
     pub goal: Goal,
     /// True if the environment is sampled by visibility tables; `None`: where a pilot finds that they pay.
     pub environment_visibility: Option<bool>,
+    /// Fraction of the work, from 0 to below 1, for an audit: path tracing of some pixels, which measures the
+    /// bias. `None`: 0.05 if the method is biased, or more where the audit alone delays an error target.
+    pub audit: Option<f64>,
 }
 
 impl Settings {
@@ -49,6 +52,7 @@ impl Settings {
             shard: Shard::WHOLE,
             goal: Goal::default(),
             environment_visibility: None,
+            audit: None,
         }
     }
 
@@ -64,11 +68,14 @@ impl Settings {
     }
 
     /// # Errors
-    /// [`RenderError::Size`] and [`RenderError::Shard`].
+    /// [`RenderError::Size`], [`RenderError::Shard`] and [`RenderError::Audit`].
     pub(super) fn check(&self) -> Result<(), RenderError> {
         let [width, height] = self.size;
         if !(1..=MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
             return Err(RenderError::Size);
+        }
+        if self.audit.is_some_and(|fraction| !(0.0..1.0).contains(&fraction)) {
+            return Err(RenderError::Audit);
         }
         let Shard { index, count } = self.shard;
         match index >= count || count as usize > Tile::count(width, height) {

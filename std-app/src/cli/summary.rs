@@ -106,7 +106,7 @@ fn parts(noise: &ErrorEstimate, name: &str, part: &BiasEstimate) -> String {
 pub(super) fn audited(audit: &Audited) -> Vec<String> {
     let error = error(&audit.total);
     if audit.is_blind {
-        let unseen = 100.0 * audit.unseen;
+        let unseen = 100.0 * audit.work.unseen;
         return vec![
             format!("{error}, noise alone; the bias is unknown:"),
             format!("audit  its paths miss about {unseen:.0} % of the light, through mirrors and glass"),
@@ -120,7 +120,7 @@ pub(super) fn audited(audit: &Audited) -> Vec<String> {
             "audit  {verdict}: {} with {} each; whole picture off by {:+.2} % ± {:.2} %; \
              detectable bias {:.1e}",
             plural(audit.pixels.into(), "pixel"),
-            plural(audit.samples.into(), "sample"),
+            plural(audit.work.samples.into(), "sample"),
             100.0 * audit.whole.mean,
             100.0 * audit.whole.error,
             audit.bias.detectable,

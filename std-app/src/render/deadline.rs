@@ -94,6 +94,8 @@ pub(super) enum End {
     Round(Option<Instant>),
     /// A sketch after the end of the render: at a time.
     Sketch(Instant),
+    /// Estimates of the error: none, since they are short.
+    Never,
 }
 
 impl End {
@@ -107,12 +109,13 @@ impl End {
             }
             End::Round(deadline) => render.is_interrupted() || is_past(deadline),
             End::Sketch(end) => is_past(Some(end)),
+            End::Never => false,
         }
     }
 
     pub(super) fn deadline(self) -> Option<Instant> {
         match self {
-            End::Prepass => None,
+            End::Prepass | End::Never => None,
             End::FirstRound(deadline) | End::FirstSamples(deadline, _) | End::Round(deadline) => deadline,
             End::Sketch(end) => Some(end),
         }

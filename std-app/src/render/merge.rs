@@ -1,16 +1,15 @@
 //! Merging of the shards of a picture, with the bits of a single render.
 
-use super::ErrorEstimate;
-use super::audit::{self, Audited};
 use super::error::{FileError, RenderError};
-use super::error_report::{ErrorReport, NoiseAndBlur};
-use super::film_file::Reader;
+use super::film_file::{Header, Reader};
 use super::method::Method;
 use super::picture::image;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
-use super::threads::{Pool, Workers};
+use super::threads::{Pool, Threads, Workers};
+use super::{Audited, ErrorEstimate, NoiseAndBlur};
 use crate::memory::{Budget, lines};
 use crate::save::Image;
+use halflight_core::audit::{AuditedPixels, ErrorReport};
 use halflight_core::memory::Arena;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::transport::Counters;
@@ -75,17 +74,26 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let mut state = RenderState::new(width, height, Shard::WHOLE, &mut arena)?;
     state.is_correlated = first.header.shares;
     let mut seconds = 0.0;
-    let audits = films.iter().map(|film| Some((film.header.shard(), film.header.audit()?)));
-    let audits: Option<Vec<_>> = audits.collect();
+    let headers: Vec<Header> = films.iter().map(|film| film.header.clone()).collect();
     for film in films {
         seconds += film.header.seconds;
         film.read_into(&mut state)?;
     }
+    let audits = headers.iter().map(|header| Some((header.shard(), header.audit()?)));
+    let audits: Option<Vec<_>> = audits.collect();
+    let pixels = audits.iter().flatten().map(|(_, audit)| audit.pixels.len()).sum();
+    let mut audited = crate::memory::lines(AuditedPixels::merged_footprint(pixels))?;
     let pool = Pool::new(None)?;
-    let workers = Workers::new(&pool);
-    let report = ErrorReport::with(&workers, &state, |noise| {
-        let (mean, audits) = workers.mean(&state.film).zip(audits)?;
-        audit::State::merged(audits, &state.film, mean)?.verdict(&state.film, mean, noise)
+    let report = Workers::new(&pool).estimating(|executor| {
+        let film = &state.film;
+        let judge = |mean: f64, noise: ErrorEstimate, executor: &mut Threads| {
+            let merged = AuditedPixels::merged(&audits?, film, mean, &mut Arena::over(&mut audited));
+            // The memory is of the stated size.
+            let mut merged = merged.ok()??;
+            merged.compare(film, mean, executor);
+            merged.verdict(noise)
+        };
+        ErrorReport::of_film(film, state.is_correlated, judge, executor)
     });
     Ok(Merged {
         image: image(&state.film),

@@ -1,25 +1,26 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
-use super::audit::Audit;
-use super::error_report::ErrorReport;
+use super::audit::ThreadedAudit;
 use super::film_file::{self, Header, Identity, Reader};
 use super::gaps::{self, Sketch};
-use super::hidden_light;
 use super::history::{Clock, Reference, Round};
+use super::memory::Memory;
 use super::method::{Method, RenderSetup, Renderer};
 use super::rejected_tiles::{self, empty_pixels};
 use super::rewritten_file::RewrittenFile;
-use super::rounds::{Plan, Rounds};
 use super::survey::Survey;
 use super::threads::{RoundLimits, ThreadedRound, Workers};
 use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds};
 use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
+use halflight_core::audit::{ErrorReport, ExtraTime, Spent};
+use halflight_core::bsdf::Features;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::findings::{Findings, Value};
 use halflight_core::method::hidden_light::HiddenLight;
 use halflight_core::method::{RenderState, Shard};
+use halflight_core::renderer::{OutOfReach, Plan, Rounds};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
@@ -45,13 +46,15 @@ pub(super) fn ending_seconds(pixels: usize) -> f64 {
 }
 
 /// A picture to be rendered.
-pub(super) struct Picture<'a> {
+pub(super) struct Picture<'a, 'm, F> {
     pub(super) method: Method,
     pub(super) setup: RenderSetup<'a>,
     pub(super) state: RenderState<'a>,
-    pub(super) audit: Option<Audit<'a>>,
+    pub(super) audit: Option<ThreadedAudit<'a, F>>,
     /// Light that the method cannot find.
     pub(super) hidden: Option<HiddenLight>,
+    /// Memory that the audit borrows.
+    pub(super) memory: &'a mut Memory<'m>,
     pub(super) identity: Identity,
     pub(super) resumed: Option<Reader>,
     pub(super) clock: &'a mut Clock,
@@ -61,9 +64,9 @@ pub(super) struct Picture<'a> {
     pub(super) sketch: &'a Sketch<'a>,
 }
 
-impl Picture<'_> {
+impl<F: Features> Picture<'_, '_, F> {
     /// Renders until a stop rule holds. The caller adds times and memory of the structures that it built.
-    pub(super) fn render(self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
+    pub(super) fn render(self, renderer: &mut dyn Renderer<F>) -> Result<RenderResult, RenderError> {
         let mut render = Progressive::new(self)?;
         while let Some(plan) = render.plan() {
             render.round(&plan, renderer)?;
@@ -76,8 +79,8 @@ impl Picture<'_> {
 }
 
 /// A picture in progress.
-struct Progressive<'a> {
-    picture: Picture<'a>,
+struct Progressive<'a, 'm, F> {
+    picture: Picture<'a, 'm, F>,
     rounds: Rounds,
     history: Vec<Round>,
     reference: Option<Reference<'a>>,
@@ -98,8 +101,8 @@ struct Progressive<'a> {
     lost: Option<Ending>,
 }
 
-impl<'a> Progressive<'a> {
-    fn new(mut picture: Picture<'a>) -> Result<Self, RenderError> {
+impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
+    fn new(mut picture: Picture<'a, 'm, F>) -> Result<Self, RenderError> {
         let Picture { method, setup, state, audit, resumed, clock, .. } = &mut picture;
         let settings = setup.settings;
         state.is_correlated = method.shares();
@@ -108,11 +111,11 @@ impl<'a> Progressive<'a> {
             Some(film) => {
                 let header = film.header.clone();
                 clock.pause(|| film.read_into(state))?;
-                let Header { spp, rounds, seconds, estimates, .. } = header;
+                let Header { spp, rounds, seconds, .. } = header;
                 if let (Some(audit), Some(earlier)) = (audit, header.audit()) {
-                    audit.resume(earlier);
+                    audit.audit.resume(&earlier);
                 }
-                let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
+                let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, header.estimates());
                 (rounds, header.history())
             }
         };
@@ -142,13 +145,13 @@ impl<'a> Progressive<'a> {
     fn plan(&self) -> Option<Plan> {
         let Picture { audit, setup: RenderSetup { settings, .. }, clock, .. } = &self.picture;
         let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let is_open = audit.as_ref().is_some_and(Audit::is_open);
+        let is_open = audit.as_ref().is_some_and(|audit| audit.audit.is_open());
         let opening = if is_open { OPENING_AUDIT * pixels } else { 0.0 };
         self.rounds.next(clock.seconds(), self.estimating + self.ending + opening)
     }
 
     /// Adds samples, estimates the error if due, writes the film file and reports progress.
-    fn round(&mut self, plan: &Plan, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
+    fn round(&mut self, plan: &Plan, renderer: &mut dyn Renderer<F>) -> Result<(), RenderError> {
         self.add_samples(plan, renderer)?;
         self.report = None;
         let error = match self.rounds.estimate_is_due() {
@@ -170,13 +173,13 @@ impl<'a> Progressive<'a> {
         }
         let unsaved = self.kept.new_failure().or_else(|| renderer.kept()?.new_failure());
         let Picture { clock, progress, state, .. } = &mut self.picture;
-        let known =
-            Progress { unsaved, film: Some(&state.film), ..self.rounds.progress(seconds, self.latest) };
+        let known = progress_of(&self.rounds, seconds, self.latest);
+        let known = Progress { unsaved, film: Some(&state.film), ..known };
         clock.pause(|| progress(&known));
         Ok(())
     }
 
-    fn add_samples(&mut self, plan: &Plan, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
+    fn add_samples(&mut self, plan: &Plan, renderer: &mut dyn Renderer<F>) -> Result<(), RenderError> {
         let Picture { setup: RenderSetup { workers, .. }, state, clock, .. } = &mut self.picture;
         let now = clock.seconds();
         // A time beyond the range of the clock is no deadline.
@@ -194,25 +197,22 @@ impl<'a> Progressive<'a> {
     }
 
     /// Estimates the error: noise from the two half-films, bias by the audit or from the photons' kernels.
-    fn estimate(&mut self, renderer: &mut dyn Renderer) -> Result<Option<ErrorEstimate>, RenderError> {
+    fn estimate(&mut self, renderer: &mut dyn Renderer<F>) -> Result<Option<ErrorEstimate>, RenderError> {
         self.step_audit(renderer)?;
         let start = Instant::now();
         let Picture { setup, state, audit, hidden, .. } = &mut self.picture;
-        let mut report =
-            ErrorReport::new(setup.workers, state, audit.as_ref()).lacking(hidden.as_ref(), &state.film);
+        let audit = audit.as_mut().map(|audit| &mut audit.audit);
+        let mut report = setup.workers.estimating(|executor| ErrorReport::new(state, audit, executor));
+        report = report.lacking(hidden.as_ref(), &state.film);
         self.estimating = start.elapsed().as_secs_f64();
         self.estimated += self.estimating;
         report = self.extend_audit(report, renderer)?;
         let start = Instant::now();
-        let has_floor = report.noise.is_some_and(|noise| self.rounds.has_floor(noise));
-        let is_biased = report.audited.as_ref().is_some_and(|audited| self.rounds.is_out_of_reach(audited));
-        let lacks = report.lacking.is_some_and(|lacking| self.rounds.is_below(lacking.error.lower));
-        self.lost = match () {
-            () if lacks => Some(Ending::Biased),
-            () if self.picture.method.converges() => None,
-            () if is_biased => Some(Ending::Biased),
-            () => has_floor.then_some(Ending::NoiseFloor),
-        };
+        self.lost =
+            self.rounds.out_of_reach(&report, self.picture.method.converges()).map(|reason| match reason {
+                OutOfReach::Bias => Ending::Biased,
+                OutOfReach::NoiseFloor => Ending::NoiseFloor,
+            });
         self.latest = report.error();
         self.rounds.estimated(self.latest);
         self.estimating += start.elapsed().as_secs_f64();
@@ -221,16 +221,19 @@ impl<'a> Progressive<'a> {
     }
 
     /// Takes the samples of the audit that are due.
-    fn step_audit(&mut self, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
-        let Picture { setup: RenderSetup { settings, workers, .. }, state, audit, clock, .. } =
+    fn step_audit(&mut self, renderer: &mut dyn Renderer<F>) -> Result<(), RenderError> {
+        let Picture { setup: RenderSetup { settings, workers, .. }, state, audit, clock, memory, .. } =
             &mut self.picture;
         let Some(audit) = audit else { return Ok(()) };
-        let left = settings.stop.seconds.map(|limit| limit - self.estimating - clock.seconds());
-        let work = (state.counters.all_rays(), clock.seconds());
-        if audit.is_open() {
-            audit.set_risks(renderer.risks(workers)?);
-        }
-        renderer.lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))
+        let (seconds, start) = (clock.seconds(), Instant::now());
+        let spent = Spent {
+            rays: state.counters.all_rays(),
+            seconds,
+            left: settings.stop.seconds.map(|limit| limit - self.estimating - seconds),
+            clock: &|| start.elapsed().as_secs_f64(),
+        };
+        let (audit, mut executor) = audit.at_work(workers);
+        Ok(audit.step(renderer, (&state.film, &spent), *memory, &mut executor)?)
     }
 
     /// Focuses the audit after its first samples, and continues the audit alone if only the bias estimate is
@@ -238,40 +241,23 @@ impl<'a> Progressive<'a> {
     fn extend_audit(
         &mut self,
         report: ErrorReport,
-        renderer: &mut dyn Renderer,
+        renderer: &mut dyn Renderer<F>,
     ) -> Result<ErrorReport, RenderError> {
         let Picture { setup, state, audit, clock, progress, interrupt, .. } = &mut self.picture;
         let (RenderSetup { settings, workers, .. }, rounds) = (*setup, &self.rounds);
         let Some(audit) = audit else { return Ok(report) };
-        if let Some(audited) = &report.audited {
-            audit.reduce_pixels(audited, (state.counters.all_rays(), rounds.spp()));
-        }
-        if settings.audit.is_some() {
-            return Ok(report);
-        }
-        let left = settings.stop.seconds.map(|limit| limit - self.estimating);
+        let (left, start) = (settings.stop.seconds.map(|limit| limit - self.estimating), Instant::now());
         let error = report.error();
-        let mut may = |cost: f64| {
-            let known = rounds.progress(clock.seconds(), error);
+        let mut may_take = |cost: f64| {
+            let known = progress_of(rounds, clock.seconds(), error);
             clock.pause(|| progress(&known));
             let is_time = left.is_none_or(|left| clock.seconds() + cost < left);
             is_time && !interrupt.load(Ordering::Relaxed)
         };
-        let mut report = report;
-        while report.audited.as_ref().is_some_and(|audited| rounds.waits_for(audited)) {
-            let mut went = false;
-            renderer.lend_photons(&mut |photons| {
-                went = audit.extend(workers, photons, &mut may)?;
-                Ok(())
-            })?;
-            if !went {
-                break;
-            }
-            let verdict = |noise| audit.verdict(workers, &state.film, noise);
-            let lacking = report.lacking;
-            report = ErrorReport { lacking, ..ErrorReport::of_noise(report.noise, workers, state, verdict) };
-        }
-        Ok(report)
+        let time = ExtraTime { may_take: &mut may_take, clock: &|| start.elapsed().as_secs_f64() };
+        let (audit, mut executor) = audit.at_work(workers);
+        let time = settings.audit.is_none().then_some(time);
+        Ok(rounds.extend_audit((audit, renderer), (state, report), time, &mut executor)?)
     }
 
     /// Writes the film file, during the render or at the end with patience `last`.
@@ -280,7 +266,8 @@ impl<'a> Progressive<'a> {
         let (kept, rounds, history) = (&mut self.kept, &self.rounds, &self.history);
         clock.pause(|| {
             let write = |path: &Path, patience: Patience| {
-                let header = Header::new(identity.clone(), state, rounds, audit.as_ref(), seconds, history);
+                let audit = audit.as_ref().map(|audit| audit.audit.state());
+                let header = Header::new(identity.clone(), state, rounds, audit, seconds, history);
                 film_file::write(path, &header, state, patience)
             };
             match last {
@@ -300,7 +287,7 @@ impl<'a> Progressive<'a> {
     }
 
     /// Writes the files for the last time, takes the last samples of the audit, and returns the result.
-    fn finish(mut self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
+    fn finish(mut self, renderer: &mut dyn Renderer<F>) -> Result<RenderResult, RenderError> {
         let interrupted = self.is_interrupted();
         let patience = Patience { since: self.began, interrupt: self.picture.interrupt };
         let is_known = self.history.last().is_some_and(|last| last.error.is_some());
@@ -318,10 +305,13 @@ impl<'a> Progressive<'a> {
             self.write_film(self.picture.clock.seconds(), Some(patience));
         }
         let start = Instant::now();
-        let Picture { setup, state, audit, hidden, .. } = &self.picture;
-        let report = self.report.take().unwrap_or_else(|| {
-            ErrorReport::new(setup.workers, state, audit.as_ref()).lacking(hidden.as_ref(), &state.film)
-        });
+        let Picture { setup, state, audit, hidden, .. } = &mut self.picture;
+        let audit = audit.as_mut().map(|audit| &mut audit.audit);
+        let anew = || {
+            let report = setup.workers.estimating(|executor| ErrorReport::new(state, audit, executor));
+            report.lacking(hidden.as_ref(), &state.film)
+        };
+        let report = self.report.take().unwrap_or_else(anew);
         self.estimated += start.elapsed().as_secs_f64();
         self.result(report, renderer, interrupted)
     }
@@ -329,7 +319,7 @@ impl<'a> Progressive<'a> {
     fn result(
         mut self,
         report: ErrorReport,
-        renderer: &mut dyn Renderer,
+        renderer: &mut dyn Renderer<F>,
         interrupted: bool,
     ) -> Result<RenderResult, RenderError> {
         let Picture { method, setup, state, clock, sketch, .. } = &self.picture;
@@ -364,7 +354,7 @@ impl<'a> Progressive<'a> {
             seconds: Seconds { build: 0.0, render, estimate: self.estimated },
             counters: state.counters,
             findings: findings
-                .and(report.lacking.as_ref().map(hidden_light::finding))
+                .and(report.lacking.map(|lacking| lacking.finding()))
                 .and(survey.as_ref().map(Survey::finding)),
             survey,
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },
@@ -386,6 +376,13 @@ impl<'a> Progressive<'a> {
             stop_rule: (ending == Ending::Done).then(|| self.rounds.rule()),
         })
     }
+}
+
+/// Progress to report at `seconds`.
+fn progress_of(rounds: &Rounds, seconds: f64, error: Option<ErrorEstimate>) -> Progress<'static> {
+    let seconds_left = rounds.seconds_left(seconds, error);
+    let (spp, rounds) = (rounds.spp(), rounds.count());
+    Progress { seconds, seconds_left, spp, rounds, error, unsaved: None, film: None }
 }
 
 /// Samples of a tile between two checks of the clock.

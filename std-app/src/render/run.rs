@@ -1,6 +1,6 @@
 //! A render from its settings to its result: checks, structures, method, and the rounds of the picture.
 
-use super::audit::Audit;
+use super::audit::ThreadedAudit;
 use super::built::{Built, BuiltMemory};
 use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
@@ -155,7 +155,7 @@ impl WithFeatures for Render<'_> {
                 }
                 Ok(Attempt::Ready(renderer)) => {
                     let (method, findings) = (renderer.chosen(), renderer.findings());
-                    Audit::new::<F>(&setup, &mut own, method).and_then(|audit| {
+                    ThreadedAudit::<F>::new(&setup, &mut own, method).and_then(|audit| {
                         let hidden = hidden_light::measure::<F>(&setup, &mut own, method, &findings)?;
                         Ok((renderer, audit, hidden))
                     })
@@ -178,6 +178,7 @@ impl WithFeatures for Render<'_> {
                 state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
                 audit,
                 hidden,
+                memory: &mut own,
                 identity: request.identity(method),
                 resumed: resumed.take(),
                 clock: &mut clock,

@@ -22,9 +22,6 @@ const MOST_PIXELS: u64 = 1 << 21;
 /// Seconds that a survey may take in any case.
 const MIN_SECONDS: f64 = 10.0;
 
-/// Most pixels with an own risk; in larger pictures neighbours share one.
-const MOST_RISKS: u64 = 1 << 16;
-
 /// Gatherings at each held-out point.
 const REPEATS: u32 = 2;
 
@@ -179,65 +176,6 @@ pub(super) fn survey<F: Features>(
         checks: checked.into_iter().map(|(check, _)| check).collect(),
         seconds: start.elapsed().as_secs_f64(),
     }))
-}
-
-/// Relative variance of record values at each pixel, row by row: where records disagree, some are wrong. 0
-/// without records; empty if interrupted. In large pictures neighbours share a value.
-pub(super) fn risks<F: Features>(
-    tracer: &PathIntegrator<F>,
-    caches: [&IrradianceCache; 2],
-    size: [u32; 2],
-    executor: &mut impl Executor,
-) -> Result<Vec<f32>, RenderError> {
-    let [width, height] = size;
-    let mut step = 1;
-    while u64::from(width.div_ceil(step)) * u64::from(height.div_ceil(step)) > MOST_RISKS {
-        step *= 2;
-    }
-    let order = ProgressiveOrder::new(width, height, step);
-    let mut found = vec![[0.0; 2]; order.len() as usize];
-    let passed = executor.pass(found.chunks_mut(PIXELS), |task, out, _| {
-        let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
-        tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
-        for (out, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
-            *out = record_mean_and_variance(place, caches);
-        }
-        Ok(counters)
-    })?;
-    if !passed.is_complete {
-        return Ok(Vec::new());
-    }
-    let known = || found.iter().filter(|[value, _]| *value > 0.0);
-    let mean = known().map(|[value, _]| f64::from(*value)).sum::<f64>() / known().count().max(1) as f64;
-    let dark = ((MIN_IRRADIANCE * mean).powi(2)) as f32;
-    let mut risks = vec![0.0; width as usize * height as usize];
-    for (i, [value, variance]) in found.into_iter().enumerate() {
-        let Some((x, y)) = order.pixel(i as u64).filter(|_| value > 0.0) else { continue };
-        for row in y..(y + step).min(height) {
-            let first = row as usize * width as usize;
-            let end = (x + step).min(width) as usize;
-            risks[first + x as usize..first + end].fill(variance / (value * value + dark));
-        }
-    }
-    Ok(risks)
-}
-
-/// Weighted mean of the values of both caches' records at a point, and their variance.
-fn record_mean_and_variance(place: &GatherPoint, caches: [&IrradianceCache; 2]) -> [f32; 2] {
-    let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
-    for cache in caches {
-        cache.visit_values(&place.query(), |value, weight| {
-            let value = luminance(value) as f32;
-            sum += weight * value;
-            squares += weight * value * value;
-            weights += weight;
-        });
-    }
-    if weights <= 0.0 {
-        return [0.0; 2];
-    }
-    let mean = sum / weights;
-    [mean, (squares / weights - mean * mean).max(0.0)]
 }
 
 fn survey_pixel(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -> SurveyPixel {

@@ -110,6 +110,12 @@ impl<'w> Workers<'w> {
         self.pool.install(work)
     }
 
+    /// Runs `work` with an executor of estimates of the error, which have no working memory.
+    pub(super) fn estimating<T>(&self, work: impl FnOnce(&mut Threads) -> T) -> T {
+        let mut scratch = vec![Vec::new(); self.count()];
+        work(&mut Threads::new(self, &mut scratch).until(End::Never))
+    }
+
     /// Runs `work` once on every thread, each with its own working memory. The parallel iterator is compiled
     /// once, since passes hand it a trait object.
     fn on_all(

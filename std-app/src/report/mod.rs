@@ -65,7 +65,7 @@ impl Run<'_> {
             false => {
                 let photons = self.result.findings.get("caustic_photons");
                 let has_photons = photons.is_some_and(|finding| finding.decision != Decision::LeftOut);
-                has_photons && audit.is_none_or(|audit| !audit.has_photons)
+                has_photons && audit.is_none_or(|audit| !audit.work.has_photons)
             }
         };
         has_doubt.then_some("path tracing, the judge, may miss light through mirrors and glass")

@@ -1,8 +1,8 @@
 //! The audit finds bias where it exists, and nowhere else.
 
-use super::*;
 use crate::load::{LoadOptions, load};
-use crate::render::{Audited, Checkpoint, Ending, Method, RenderResult, Stop, merge, render};
+use crate::render::{AuditWork, Audited, Checkpoint, Ending, Method, RenderResult};
+use crate::render::{Settings, Shard, Stop, merge, render};
 use core::sync::atomic::AtomicBool;
 use halflight_core::estimate::Difference;
 
@@ -104,11 +104,11 @@ fn an_audit_that_alone_keeps_a_picture_from_its_end_goes_on() {
                 "{:?}",
                 result.audit
             );
-            sums = (sums.0 + result.counters.all_rays(), sums.1 + result.audit.unwrap().rays);
+            sums = (sums.0 + result.counters.all_rays(), sums.1 + result.audit.unwrap().work.rays);
         }
         sums
     };
-    let ((picture, audit), (before, share)) = (work(None), work(Some(SHARE)));
+    let ((picture, audit), (before, share)) = (work(None), work(Some(0.05)));
     assert!(20 * (picture + audit) < 19 * (before + share), "{picture} {audit}, {before} {share}");
     assert!(5 * audit * before > 6 * share * picture, "{picture} {audit}, {before} {share}");
     assert!(share <= before / 18, "{before} {share}");
@@ -130,7 +130,10 @@ fn any_number_of_threads_finds_the_same() {
         let [one, three] = [1, 3].map(|threads| {
             let threads = Some(threads);
             let result = picture(Settings { stop, threads, audit, ..settings(WRONG, 0, 2, 0.0) });
-            (result.image, result.audit.map(|audit| Audited { seconds: 0.0, ..audit }))
+            (
+                result.image,
+                result.audit.map(|audit| Audited { work: AuditWork { seconds: 0.0, ..audit.work }, ..audit }),
+            )
         });
         assert!(one == three, "{audit:?}");
     }
@@ -143,10 +146,10 @@ fn the_share_of_the_work_is_kept() {
     let rays = result.counters.all_rays() as f64;
     let stop = Stop { error: Some(1e-9), spp: Some(128), ..Stop::default() };
     let by_rays = picture(Settings { stop, audit: Some(0.05), ..settings(Method::Path, 0, 3, 0.05) });
-    let exact = by_rays.audit.unwrap().rays as f64 / by_rays.counters.all_rays() as f64;
+    let exact = by_rays.audit.unwrap().work.rays as f64 / by_rays.counters.all_rays() as f64;
     assert!((0.045..0.0535).contains(&exact), "{exact}");
     // Measured by the clock on a busy machine: only the order of magnitude.
-    assert!((0.01..0.25).contains(&(audit.rays as f64 / rays)), "{audit:?}");
+    assert!((0.01..0.25).contains(&(audit.work.rays as f64 / rays)), "{audit:?}");
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! Header of a film file: one JSON object, readable with `head -c`.
 
+use super::audit::AuditEntry;
 use super::identity::Identity;
-use crate::render::audit::{self, Audit};
-use crate::render::rounds::{Estimates, Rounds};
 use crate::render::{ErrorEstimate, Method, Round};
+use halflight_core::audit::AuditState;
 use halflight_core::film::Dropped;
 use halflight_core::method::{RenderState, Shard};
+use halflight_core::renderer::{Estimates, Rounds};
 use halflight_core::transport::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ pub(in crate::render) struct Header {
     pub(in crate::render) shares: bool,
     pub(in crate::render) spp: u32,
     pub(in crate::render) rounds: u32,
-    pub(in crate::render) estimates: Estimates,
+    estimates: EstimatesEntry,
     pub(in crate::render) seconds: f64,
     paths: u64,
     rays: u64,
@@ -27,7 +28,7 @@ pub(in crate::render) struct Header {
     /// Tiles with rejected samples, and their numbers by cause.
     ledger: Vec<(u32, Causes)>,
     history: Vec<Entry>,
-    audit: Option<audit::State>,
+    audit: Option<AuditEntry>,
 }
 
 /// Rejected samples: NaN, infinite, negative, unfinished.
@@ -41,19 +42,18 @@ impl Header {
         identity: Identity,
         state: &RenderState,
         rounds: &Rounds,
-        audit: Option<&Audit>,
+        audit: Option<AuditState>,
         seconds: f64,
         history: &[Round],
     ) -> Self {
         let RenderState { shard, counters, dropped, .. } = state;
-        let error = |e: ErrorEstimate| [e.relmse, e.lower, e.upper];
         Self {
             identity,
             shard: [shard.index + 1, shard.count],
             shares: state.is_correlated,
             spp: state.spp(),
             rounds: rounds.count(),
-            estimates: rounds.estimates(),
+            estimates: estimates_entry(rounds.estimates()),
             seconds,
             paths: counters.paths,
             rays: counters.rays,
@@ -64,8 +64,8 @@ impl Header {
                 .filter(|(_, dropped)| dropped.total() > 0)
                 .map(|(tile, dropped)| (tile, causes(*dropped)))
                 .collect(),
-            history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
-            audit: audit.map(|audit| audit.state().clone()),
+            history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(numbers))).collect(),
+            audit: audit.map(|audit| AuditEntry::new(&audit)),
         }
     }
 
@@ -94,18 +94,43 @@ impl Header {
     }
 
     /// State of the audit, if there is one.
-    pub(in crate::render) fn audit(&self) -> Option<audit::State> {
-        self.audit.clone().filter(audit::State::is_whole)
+    pub(in crate::render) fn audit(&self) -> Option<AuditState<'_>> {
+        self.audit.as_ref().map(AuditEntry::state)
+    }
+
+    /// Last and next estimate of the error.
+    pub(in crate::render) fn estimates(&self) -> Estimates {
+        let EstimatesEntry { next, last, first_noise } = self.estimates;
+        Estimates { next, last: last.map(|(spp, error)| (spp, estimate(error))), first_noise }
     }
 
     pub(in crate::render) fn history(&self) -> Vec<Round> {
-        let error = |[relmse, lower, upper]: [f64; 3]| ErrorEstimate { relmse, lower, upper };
-        let round = |&(seconds, spp, rays, estimate): &Entry| {
-            let error = estimate.map(error);
+        let round = |&(seconds, spp, rays, error): &Entry| {
+            let error = error.map(estimate);
             Round { seconds, spp, rays, error, reference: None }
         };
         self.history.iter().map(round).collect()
     }
+}
+
+/// State of error estimation: last and next estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct EstimatesEntry {
+    next: u32,
+    last: Option<(u32, [f64; 3])>,
+    first_noise: Option<(u32, f64)>,
+}
+
+fn estimates_entry(Estimates { next, last, first_noise }: Estimates) -> EstimatesEntry {
+    EstimatesEntry { next, last: last.map(|(spp, error)| (spp, numbers(error))), first_noise }
+}
+
+fn numbers(error: ErrorEstimate) -> [f64; 3] {
+    [error.relmse, error.lower, error.upper]
+}
+
+fn estimate([relmse, lower, upper]: [f64; 3]) -> ErrorEstimate {
+    ErrorEstimate { relmse, lower, upper }
 }
 
 fn causes(dropped: Dropped) -> Causes {

@@ -1,5 +1,6 @@
 //! Film files: checkpoints of a render, and shards to merge. Format: docs/film-file.md.
 
+mod audit;
 mod header;
 mod identity;
 

@@ -77,7 +77,7 @@ impl<'m> CacheKeeper<'m> {
         let RenderSetup { settings, workers, .. } = *setup;
         memory.give_back(LOADED);
         let exact = PathIntegrator::<F>::gather_scratch(EXACT);
-        let reserve = super::Audit::bytes::<F>(setup, true);
+        let reserve = super::ThreadedAudit::<F>::bytes(setup, true);
         let needed = (exact.bytes() * workers.count()).saturating_add(reserve);
         let survey = match settings.survey.filter(|_| memory.has(needed)) {
             Some(points) => Some((points, memory.take_each("survey", exact, workers.count())?)),

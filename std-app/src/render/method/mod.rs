@@ -9,21 +9,22 @@ pub use halflight_core::cache::radiance::{Basis, LobeSettings};
 pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Method, PhotonSettings};
 pub use photon_view::{MapView, PhotonView};
 
-use super::audit::{Audit, SHARE};
-use super::deadline::End;
+use super::audit::ThreadedAudit;
 use super::memory::Memory;
 use super::rewritten_file::RewrittenFile;
 use super::run::path_settings;
-use super::survey::{self, Survey};
+use super::survey::Survey;
 use super::threads::{ThreadedRound, Threads, Workers};
 use super::{RenderError, Settings};
 use crate::save::Patience;
 use cache_keeper::{CacheKeeper, LoadedCaches};
+use halflight_core::audit::{AuditedMethod, Borrower, audit_fraction};
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
+use halflight_core::cache::irradiance::IrradianceCache;
 use halflight_core::findings::Findings;
 use halflight_core::light::LightSampler;
-use halflight_core::memory::Line;
+use halflight_core::memory::{Line, OutOfMemory};
 use halflight_core::method::cached_paths::KeptCaches;
 use halflight_core::method::choice::Goal;
 use halflight_core::method::{
@@ -31,12 +32,12 @@ use halflight_core::method::{
     RenderContext, RenderMethod, rays_per_second,
 };
 use halflight_core::scene::Scene;
-use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
+use halflight_core::transport::{PathIntegrator, PathSettings};
 
 /// Outcome of setting a method up.
 pub(super) enum Attempt<'a, 'm, F> {
     /// The method, with its structures in memory.
-    Ready(Box<dyn Renderer + 'm>),
+    Ready(Box<dyn Renderer<F> + 'm>),
     /// A prepass prefers this plan, for which the memory of the attempt is to be released first.
     Instead(MethodPlan<'a, F>),
 }
@@ -109,8 +110,8 @@ impl<'a> RenderSetup<'a> {
             options: settings.options(),
             goal: self.goal(),
             shards: settings.shard.count,
-            reserve: [false, true].map(|is_biased| Audit::bytes::<F>(self, is_biased)),
-            is_audited: settings.audit.unwrap_or(SHARE) > 0.0,
+            reserve: [false, true].map(|is_biased| ThreadedAudit::<F>::bytes(self, is_biased)),
+            is_audited: audit_fraction(settings.audit, true).is_some(),
             kept,
             widens: !keeps_records,
             has_fixed_records: settings.load_cache.is_some() || keeps_records,
@@ -120,7 +121,7 @@ impl<'a> RenderSetup<'a> {
 
 impl Settings {
     /// Options of all methods.
-    fn options(&self) -> MethodOptions {
+    pub(super) fn options(&self) -> MethodOptions {
         MethodOptions {
             paths: PathOptions { reuse: self.reuse, caustics: self.caustics },
             cache: self.cache,
@@ -150,11 +151,8 @@ impl Settings {
     }
 }
 
-/// Callback of paths that borrow caustic photons.
-pub(super) type Borrower<'b> = dyn FnMut(Option<CausticMerging>) -> Result<(), RenderError> + 'b;
-
 /// A method at work on one scene. It owns its structures, but not the film.
-pub(super) trait Renderer {
+pub(super) trait Renderer<F>: AuditedMethod<F> {
     /// The method to report in films and results.
     fn chosen(&self) -> Method;
 
@@ -163,22 +161,6 @@ pub(super) trait Renderer {
     /// # Errors
     /// Insufficient memory.
     fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError>;
-
-    /// Calls `then` with the current caustic photons of the picture, or with none, for paths without records.
-    ///
-    /// # Errors
-    /// Errors of `then`.
-    fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
-        then(None)
-    }
-
-    /// Relative upper estimate of the squared bias of each pixel, row by row; empty if unknown.
-    ///
-    /// # Errors
-    /// Insufficient memory.
-    fn risks(&mut self, _workers: &Workers) -> Result<Vec<f32>, RenderError> {
-        Ok(Vec::new())
-    }
 
     /// Survey of the irradiance cache, if the settings ask for one.
     ///
@@ -219,7 +201,17 @@ struct Threaded<'m, F> {
     keeper: Option<CacheKeeper<'m>>,
 }
 
-impl<F: Features> Renderer for Threaded<'_, F> {
+impl<F: Features> AuditedMethod<F> for Threaded<'_, F> {
+    fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), OutOfMemory> {
+        self.method.lend_photons(then)
+    }
+
+    fn caches(&self) -> Option<(&PathIntegrator<'_, F>, [&IrradianceCache<'_>; 2])> {
+        self.method.caches()
+    }
+}
+
+impl<F: Features> Renderer<F> for Threaded<'_, F> {
     fn chosen(&self) -> Method {
         self.method.kind
     }
@@ -231,18 +223,6 @@ impl<F: Features> Renderer for Threaded<'_, F> {
             keeper.after_round(cached);
         }
         Ok(())
-    }
-
-    fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
-        self.method.lend_photons(then)?
-    }
-
-    fn risks(&mut self, workers: &Workers) -> Result<Vec<f32>, RenderError> {
-        let Some(cached) = self.method.cached() else { return Ok(Vec::new()) };
-        let settings = self.setup.settings;
-        let size = [settings.width, settings.height];
-        let mut executor = Threads::new(workers, &mut self.scratch).until(End::Round(None));
-        survey::risks(cached.caching().paths(), cached.caching().caches(), size, &mut executor)
     }
 
     fn survey(&mut self) -> Result<Option<Survey>, RenderError> {

@@ -6,6 +6,7 @@ use crate::render::RenderError;
 use crate::render::memory::Memory;
 use crate::render::threads::ThreadedRound;
 use core::ops::Range;
+use halflight_core::audit::AuditedMethod;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::memory::{Arena, Line};
@@ -28,7 +29,9 @@ impl<'a, F: Features> Wrong<'a, F> {
     }
 }
 
-impl<F: Features> Renderer for Wrong<'_, F> {
+impl<F: Features> AuditedMethod<F> for Wrong<'_, F> {}
+
+impl<F: Features> Renderer<F> for Wrong<'_, F> {
     fn chosen(&self) -> Method {
         Method::ClampedInstantRadiosity
     }

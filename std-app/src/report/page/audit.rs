@@ -17,7 +17,7 @@ pub(super) fn section(run: &Run) -> Markup {
         ("Upper bound, 95\u{202f}%", number(audit.bias.upper, 2)),
         ("Noise, as relMSE", number(audit.noise.relmse, 2)),
         ("Deviation of the whole picture", percent(&audit.whole)),
-        ("Time of the audit", readable_seconds(audit.seconds)),
+        ("Time of the audit", readable_seconds(audit.work.seconds)),
     ];
     html! {
         section {
@@ -26,7 +26,7 @@ pub(super) fn section(run: &Run) -> Markup {
             dl class="facts row" { (parts::facts(&facts)) }
             p.note {
                 "Unbiased path tracing renders " (plural(audit.pixels.into(), "pixel")) " with "
-                (plural(audit.samples.into(), "sample")) " each, in step with the picture. Differences \
+                (plural(audit.work.samples.into(), "sample")) " each, in step with the picture. Differences \
                 beyond the noise of both are bias. Means of regions are more certain than pixels, so a bias \
                 of one sign is detected before one that averages out. A bias below the noise is not detected."
             }

@@ -1,7 +1,8 @@
 //! Rounds of a picture: number of samples of the next round, and the stop rules.
 
-use super::{Audited, ErrorEstimate, Progress};
-use serde::{Deserialize, Serialize};
+use crate::audit::Audited;
+use crate::estimate::ErrorEstimate;
+use libm::{cbrt, ceil};
 
 /// Stop rules; the first that holds ends the render. Without rules: [`Stop::DEFAULT_SPP`] samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,7 +23,7 @@ impl Stop {
     pub const SENSIBLE: Self = Self { spp: None, seconds: Some(60.0), error: Some(1e-3) };
 
     /// Largest number of samples per pixel, if limited.
-    pub(super) fn most_samples(&self) -> Option<u32> {
+    pub fn most_samples(&self) -> Option<u32> {
         if *self == Self::default() { Some(Self::DEFAULT_SPP) } else { self.spp }
     }
 }
@@ -52,19 +53,20 @@ const FIRST_ESTIMATE: u32 = 4;
 const SELDOM: u32 = 16;
 
 /// Fewest samples at which an error estimate may end a render.
-pub(super) const FEWEST_FOR_ERROR: u32 = 16;
+const FEWEST_FOR_ERROR: u32 = 16;
 
 /// Noise is shared by all samples once it exceeds 1/n extrapolation of earlier noise by this factor.
 const SHARED: f64 = 2.0;
 
 /// Fewest samples per audited pixel at which bias may end a render: below, some light is rarely sampled.
-pub(super) const FEWEST_FOR_BIAS: u32 = 64;
+const FEWEST_FOR_BIAS: u32 = 64;
 
 /// Largest ratio of noise to the requested error while the audit continues alone.
 const ENOUGH: f64 = 0.5;
 
-/// The rounds of a picture.
-pub(super) struct Rounds {
+/// The rounds of a picture. Time is an argument: without a clock it stands still at 0.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounds {
     stop: Stop,
     spp: u32,
     count: u32,
@@ -81,29 +83,33 @@ pub(super) struct Rounds {
 }
 
 /// State of error estimation: last and next estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Estimates {
-    next: u32,
-    last: Option<(u32, [f64; 3])>,
-    first_noise: Option<(u32, f64)>,
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimates {
+    /// Samples at the next estimate.
+    pub next: u32,
+    /// Number of samples and error of the last estimate.
+    pub last: Option<(u32, ErrorEstimate)>,
+    /// Number of samples and upper end of noise of the first estimate that is precise enough for comparison.
+    pub first_noise: Option<(u32, f64)>,
 }
 
 /// Plan of a round.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Plan {
+pub struct Plan {
     /// Samples per pixel at its end.
-    pub(super) target: u32,
+    pub target: u32,
     /// Clock reading in seconds at which the round is cut.
-    pub(super) deadline: Option<f64>,
+    pub deadline: Option<f64>,
     /// True if it is the first round, which is completed even past the deadline, so that every pixel has a
     /// sample.
-    pub(super) first: bool,
+    pub first: bool,
     /// Seconds per sample of all pixels, if known.
-    pub(super) each: Option<f64>,
+    pub each: Option<f64>,
 }
 
 impl Rounds {
-    pub(super) fn new(stop: Stop) -> Self {
+    /// Rounds until a rule of `stop` holds.
+    pub fn new(stop: Stop) -> Self {
         let stop = Stop { spp: stop.most_samples(), ..stop };
         Self {
             stop,
@@ -118,7 +124,7 @@ impl Rounds {
     }
 
     /// Continues after `count` rounds that took `spp` samples per pixel in `seconds`.
-    pub(super) fn resumed(self, spp: u32, count: u32, seconds: f64, estimates: Estimates) -> Self {
+    pub fn resumed(self, spp: u32, count: u32, seconds: f64, estimates: Estimates) -> Self {
         let Estimates { next, last, first_noise } = estimates;
         Self {
             spp,
@@ -127,29 +133,28 @@ impl Rounds {
             began: (spp, seconds),
             first_noise,
             next_estimate: next.max(FIRST_ESTIMATE),
-            decision: last.map(|(spp, [relmse, lower, upper])| (spp, ErrorEstimate { relmse, lower, upper })),
+            decision: last,
             ..self
         }
     }
 
     /// Samples per pixel; those of the least sampled pixel after a cut round.
-    pub(super) fn spp(&self) -> u32 {
+    pub fn spp(&self) -> u32 {
         self.spp
     }
 
     /// Rounds begun.
-    pub(super) fn count(&self) -> u32 {
+    pub fn count(&self) -> u32 {
         self.count
     }
 
     /// State for a resumed render.
-    pub(super) fn estimates(&self) -> Estimates {
-        let last = self.decision.map(|(spp, error)| (spp, [error.relmse, error.lower, error.upper]));
-        Estimates { next: self.next_estimate, last, first_noise: self.first_noise }
+    pub fn estimates(&self) -> Estimates {
+        Estimates { next: self.next_estimate, last: self.decision, first_noise: self.first_noise }
     }
 
     /// True if an error estimate is due.
-    pub(super) fn estimate_is_due(&self) -> bool {
+    pub fn estimate_is_due(&self) -> bool {
         self.spp >= self.next_estimate
     }
 
@@ -157,11 +162,11 @@ impl Rounds {
     /// is due after an eighth more samples, at a multiple of sixteen. With an error target it is due when the
     /// target can be reached at the earliest, since errors fall at best with the squared number of samples
     /// while intervals narrow: after 1/32 more samples at least, and twice as many at most.
-    pub(super) fn estimated(&mut self, error: Option<ErrorEstimate>) {
+    pub fn estimated(&mut self, error: Option<ErrorEstimate>) {
         let spp = self.spp;
         let next = match (self.stop.error, error) {
             (Some(wanted), Some(error)) => {
-                let growth = (error.upper / wanted).cbrt().clamp(1.0 + 1.0 / 32.0, 2.0);
+                let growth = cbrt(error.upper / wanted).clamp(1.0 + 1.0 / 32.0, 2.0);
                 (f64::from(spp) * growth) as u32
             }
             _ => (spp + (spp / 8).max(SELDOM)) / SELDOM * SELDOM,
@@ -172,7 +177,7 @@ impl Rounds {
 
     /// Next round at `seconds`, `None` if a stop rule holds. Rounds double the samples until they last long
     /// enough; `reserve` seconds stay free at the end.
-    pub(super) fn next(&self, seconds: f64, reserve: f64) -> Option<Plan> {
+    pub fn next(&self, seconds: f64, reserve: f64) -> Option<Plan> {
         let most = self.stop.spp.unwrap_or(MOST_SAMPLES).clamp(1, MOST_SAMPLES);
         if self.spp >= most || self.error_reached() {
             return None;
@@ -188,7 +193,7 @@ impl Rounds {
         if let Some(each) = each {
             samples = samples.min((LONGEST_ROUND / each) as u32);
             if let Some(deadline) = deadline {
-                samples = samples.min(((deadline - seconds) / each).ceil() as u32);
+                samples = samples.min(ceil((deadline - seconds) / each) as u32);
             }
         }
         let target = self.spp.saturating_add(samples.max(1)).min(most);
@@ -198,28 +203,14 @@ impl Rounds {
     }
 
     /// Records a round after which the least sampled pixel has `spp` samples, at `seconds`.
-    pub(super) fn completed(&mut self, spp: u32, seconds: f64) {
+    pub fn completed(&mut self, spp: u32, seconds: f64) {
         self.spp = spp;
         self.seconds = seconds;
         self.count += 1;
     }
 
-    /// Progress to report at `seconds`.
-    pub(super) fn progress(&self, seconds: f64, error: Option<ErrorEstimate>) -> Progress<'static> {
-        let seconds_left = self.seconds_left(seconds, error);
-        Progress {
-            seconds,
-            seconds_left,
-            spp: self.spp,
-            rounds: self.count,
-            error,
-            unsaved: None,
-            film: None,
-        }
-    }
-
     /// Estimated seconds until the first rule holds: errors fall with 1 over the number of samples.
-    fn seconds_left(&self, seconds: f64, error: Option<ErrorEstimate>) -> Option<f64> {
+    pub fn seconds_left(&self, seconds: f64, error: Option<ErrorEstimate>) -> Option<f64> {
         let by_samples =
             self.stop.spp.map(|spp| seconds * (f64::from(spp) / f64::from(self.spp.max(1)) - 1.0));
         let by_time = self.stop.seconds.map(|limit| limit - seconds);
@@ -240,7 +231,7 @@ impl Rounds {
 
     /// True if the bias exceeds the requested error, judged by enough samples.
     pub(super) fn is_out_of_reach(&self, audited: &Audited) -> bool {
-        let enough = self.spp >= FEWEST_FOR_ERROR && audited.samples >= FEWEST_FOR_BIAS;
+        let enough = self.spp >= FEWEST_FOR_ERROR && audited.work.samples >= FEWEST_FOR_BIAS;
         enough && !audited.is_blind && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
     }
 
@@ -259,7 +250,7 @@ impl Rounds {
     }
 
     /// The rule that holds. The clock is not read: without another rule it is time.
-    pub(super) fn rule(&self) -> StopRule {
+    pub fn rule(&self) -> StopRule {
         match self.stop.spp {
             _ if self.error_reached() => StopRule::Error,
             Some(most) if self.spp >= most => StopRule::Samples,

@@ -1,0 +1,125 @@
+//! Error of a picture: noise from its half-films, plus bias by an audit or by photon blur.
+
+use super::run::Audit;
+use super::verdict::Audited;
+use crate::bsdf::Features;
+use crate::estimate::{BiasEstimate, ErrorEstimate};
+use crate::film::Film;
+use crate::method::hidden_light::{HiddenLight, LackingLight};
+use crate::method::{Executor, RenderState};
+
+/// Error of a picture in its parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ErrorReport {
+    /// Noise alone; `None` with fewer than four samples or for a black picture.
+    pub noise: Option<ErrorEstimate>,
+    /// Noise and bias, if there is an audit.
+    pub audited: Option<Audited>,
+    /// Noise and blur, if there are photons and no audit.
+    pub noise_and_blur: Option<NoiseAndBlur>,
+    /// Light that the method cannot find.
+    pub lacking: Option<LackingLight>,
+}
+
+impl ErrorReport {
+    /// Report of a picture, with the result of its `audit` if it has one.
+    pub fn new<F: Features, E: Executor>(
+        state: &RenderState,
+        audit: Option<&mut Audit<F>>,
+        executor: &mut E,
+    ) -> Self {
+        let film = &state.film;
+        Self::of_film(
+            film,
+            state.is_correlated,
+            |mean, noise, executor| {
+                let audit = audit?;
+                audit.compare(film, mean, executor);
+                audit.verdict(noise)
+            },
+            executor,
+        )
+    }
+
+    /// Report of `film`, whose errors are correlated between distant pixels or not. `audit` judges it by its
+    /// mean and its noise.
+    pub fn of_film<E: Executor>(
+        film: &Film,
+        is_correlated: bool,
+        audit: impl FnOnce(f64, ErrorEstimate, &mut E) -> Option<Audited>,
+        executor: &mut E,
+    ) -> Self {
+        let Some(mean) = film.mean_radiance(executor) else { return Self::default() };
+        let noise = ErrorEstimate::of_film(film, mean, is_correlated, executor);
+        let noise = Self { noise, ..Self::default() };
+        noise.audited_by(film, mean, audit, executor)
+    }
+
+    /// Report of `film` with the same noise, and the newest result of its `audit`.
+    pub fn judged_anew<F: Features, E: Executor>(
+        self,
+        film: &Film,
+        audit: &mut Audit<F>,
+        executor: &mut E,
+    ) -> Self {
+        let Some(mean) = film.mean_radiance(executor) else { return self };
+        self.audited_by(
+            film,
+            mean,
+            |mean, noise, executor| {
+                audit.compare(film, mean, executor);
+                audit.verdict(noise)
+            },
+            executor,
+        )
+    }
+
+    fn audited_by<E: Executor>(
+        self,
+        film: &Film,
+        mean: f64,
+        audit: impl FnOnce(f64, ErrorEstimate, &mut E) -> Option<Audited>,
+        executor: &mut E,
+    ) -> Self {
+        let Some(noise) = self.noise else { return self };
+        let mut audited = audit(mean, noise, executor);
+        // An audit without photons measures the blur as well, unless it is blind.
+        let sees_blur = |audited: &Audited| !audited.work.has_photons && !audited.is_blind;
+        let blur = match audited.as_ref().is_some_and(sees_blur) {
+            true => None,
+            false => BiasEstimate::of_film(film, mean, executor),
+        };
+        let mut noise_and_blur = None;
+        match (&mut audited, blur) {
+            (_, None) => {}
+            (Some(audited), Some(blur)) => audited.total = audited.total.with_bias(blur),
+            (None, Some(blur)) => {
+                noise_and_blur = Some(NoiseAndBlur { noise, blur, total: noise.with_bias(blur) });
+            }
+        }
+        Self { noise: self.noise, audited, noise_and_blur, ..self }
+    }
+
+    /// Estimate with all parts.
+    pub fn error(&self) -> Option<ErrorEstimate> {
+        let audited = self.audited.as_ref().map(|audited| audited.total);
+        let found = audited.or(self.noise_and_blur.map(|noise_and_blur| noise_and_blur.total)).or(self.noise);
+        self.lacking.map_or(found, |lacking| Some(lacking.beside(found)))
+    }
+
+    /// This report of a picture `film` that lacks `hidden` light.
+    pub fn lacking(self, hidden: Option<&HiddenLight>, film: &Film) -> Self {
+        Self { lacking: hidden.map(|hidden| hidden.lacking_in(film)), ..self }
+    }
+}
+
+/// Noise and blur of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseAndBlur {
+    /// Noise of the picture, from its half-films.
+    pub noise: ErrorEstimate,
+    /// Squared bias by photon blur, estimated from the samples.
+    pub blur: BiasEstimate,
+    /// Sum of both.
+    pub total: ErrorEstimate,
+}
