@@ -47,11 +47,11 @@
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 //!
-//! [`Method::all`] lists the methods: path tracing, irradiance and radiance caching, photon mapping, stochastic
-//! progressive photon mapping, light tracing, bidirectional path tracing, vertex connection and merging,
-//! instant radiosity, Metropolis light transport, and [`Method::Auto`], which chooses by predicted error.
-//! `examples/` has one picture by each method in one buffer (`tiny_render.rs`) and a picture on threads of the
-//! caller (`own_threads.rs`).
+//! [`Method::all`] lists the methods: path tracing, irradiance and radiance caching, photon mapping,
+//! stochastic progressive photon mapping, light tracing, bidirectional path tracing, vertex connection and
+//! merging, instant radiosity, Metropolis light transport, and [`Method::Auto`], which chooses by predicted
+//! error. `examples/` has one picture by each method in one buffer (`tiny_render.rs`) and a picture on
+//! threads of the caller (`own_threads.rs`).
 //!
 //! # Parts
 //!

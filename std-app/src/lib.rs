@@ -1,9 +1,9 @@
 //! The halflight app: loads scenes, renders them with all processors, saves pictures and reports.
 //!
-//! [`Renderer`] owns a loaded scene, its hierarchy, lights and threads, and renders many views of it. [`load`]
-//! reads scenes from files, [`load::SceneParts`] makes them from arrays, [`render`] has the settings and
-//! results, [`save`] writes pictures. [`compare`] computes the difference between two pictures, [`report`]
-//! describes a render.
+//! [`Renderer`] owns a loaded scene, its hierarchy, lights and threads, and renders many views of it.
+//! [`load`] reads scenes from files, [`load::SceneParts`] makes them from arrays, [`render`] has the settings
+//! and results, [`save`] writes pictures. [`compare`] computes the difference between two pictures,
+//! [`report`] describes a render.
 //!
 //! ```no_run
 //! use halflight::render::{Settings, Stop};

@@ -9,8 +9,8 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A loaded scene with its hierarchy, its lights and its threads. Renders of several views share them, also at
-/// the same time from several threads.
+/// A loaded scene with its hierarchy, its lights and its threads. Renders of several views share them, also
+/// at the same time from several threads.
 ///
 /// ```no_run
 /// use halflight::Renderer;

@@ -151,7 +151,6 @@ impl MethodKind {
         let mut row = 0;
         while row < all.len() {
             all[row] = TABLE[row].kind;
-            assert!(all[row] as usize == row, "rows are in the order of kinds");
             row += 1;
         }
         all
@@ -206,5 +205,16 @@ impl MethodKind {
     /// True if its paths may be joined with caustic photons.
     pub const fn may_join_caustics(self) -> bool {
         self.properties().may_join_caustics
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_in_the_order_of_kinds() {
+        assert!(TABLE.iter().enumerate().all(|(row, properties)| properties.kind as usize == row));
+        assert!(MethodKind::ALL.into_iter().all(|kind| MethodKind::named(kind.name()) == Some(kind)));
     }
 }

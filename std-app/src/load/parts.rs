@@ -41,7 +41,8 @@ pub struct PartMesh<'a> {
 /// let white = parts.material("white", Material::diffuse(Rgb::splat(0.7)));
 /// let positions = [[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]];
 /// let triangles = [[0, 1, 2], [0, 2, 3]];
-/// parts.mesh("floor", &PartMesh { positions: &positions, triangles: &triangles, ..PartMesh::default() }, white)?;
+/// let mesh = PartMesh { positions: &positions, triangles: &triangles, ..PartMesh::default() };
+/// parts.mesh("floor", &mesh, white)?;
 /// parts.light(PointLight::Point { position: [0.0, 2.0, 0.0].into(), intensity: Rgb::splat(10.0) });
 /// parts.view(View { eye: [0.0, 1.0, 3.0], look_at: [0.0; 3], up: [0.0, 1.0, 0.0] }, 40.0);
 /// let renderer = Renderer::new(parts.build()?, None)?;

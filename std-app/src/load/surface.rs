@@ -70,7 +70,7 @@ impl Resolver<'_> {
         Surface::Dielectric { ior: self.ior().unwrap_or(DEFAULT_IOR) as f32, tint, roughness }
     }
 
-    /// A metal of colour `Kd`, or `Ks` if `Kd` is black or absent; by `illum 3` a perfect mirror if `Pr` is 0.
+    /// A metal of colour `Kd`, or `Ks` if `Kd` is black or absent; a perfect mirror by `illum 3` and `Pr 0`.
     fn metal(&mut self, base: ColorInput) -> Surface {
         let is_absent = self.mtl.diffuse.is_none() && !self.mtl.has_map(MapKind::Diffuse);
         let by_specular = self.has_specular() && (is_black(&base) || is_absent);

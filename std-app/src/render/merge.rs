@@ -2,8 +2,8 @@
 
 use super::error::{FileError, RenderError};
 use super::film_file::{Header, Reader};
+use super::image::image;
 use super::method::Method;
-use super::picture::image;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
 use super::threads::{Pool, Threads, Workers};
 use super::{Audited, ErrorEstimate, NoiseAndBlur};

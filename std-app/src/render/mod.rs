@@ -18,6 +18,7 @@ mod gaps;
 mod held_out;
 mod hidden_light;
 mod history;
+mod image;
 mod memory;
 mod merge;
 mod method;
@@ -197,7 +198,7 @@ pub struct Progress<'a> {
 impl Progress<'_> {
     /// The picture so far, which is made by this call: pixels without samples are black.
     pub fn picture(&self) -> Option<Image> {
-        self.film.map(picture::image)
+        self.film.map(image::image)
     }
 }
 

@@ -2,21 +2,22 @@
 
 use super::audit::ThreadedAudit;
 use super::film_file::{self, Header, Identity, Reader};
-use super::gaps::{self, Sketch};
+use super::gaps::Sketch;
 use super::history::{Clock, Reference, Round};
+use super::image::{by_rows, image, of_size, without_gaps};
 use super::memory::Memory;
 use super::method::{Method, RenderSetup, Renderer};
 use super::rejected_tiles::{self, empty_pixels};
 use super::rewritten_file::RewrittenFile;
 use super::survey::Survey;
-use super::threads::{RoundLimits, ThreadedRound, Workers};
+use super::threads::{RoundLimits, ThreadedRound};
 use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds};
-use crate::save::{Image, Patience};
+use crate::save::Patience;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use halflight_core::audit::{ErrorReport, ExtraTime, Spent};
 use halflight_core::bsdf::Features;
-use halflight_core::film::{Film, Pixel};
+use halflight_core::film::Pixel;
 use halflight_core::findings::{Findings, Value};
 use halflight_core::method::hidden_light::HiddenLight;
 use halflight_core::method::{RenderState, Shard};
@@ -391,45 +392,4 @@ fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     let tile = each * threads as f64 / tiles.max(1) as f64;
     let step = (STEP_SECONDS / tile) as u32;
     if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
-}
-
-/// `image` of a film with these `samples` of each pixel, with filled gaps, and the number of pixels in tiles
-/// without samples.
-fn without_gaps(
-    mut image: Image,
-    samples: &[u32],
-    (state, sketch, workers): (&RenderState, &Sketch, &Workers),
-) -> (Image, u64) {
-    // Other shards fill the gaps of a shard.
-    if state.shard != Shard::WHOLE || !state.samples.contains(&0) {
-        return (image, 0);
-    }
-    let mut known: Vec<bool> = samples.iter().map(|&count| count > 0).collect();
-    let gaps = known.iter().filter(|known| !**known).count() as u64;
-    if known.iter().all(|known| !known) {
-        for ([x, y], light) in sketch(workers) {
-            let index = y as usize * image.width as usize + x as usize;
-            (image.pixels[index], known[index]) = (light, true);
-        }
-    }
-    gaps::fill(&mut image, &known);
-    (image, gaps)
-}
-
-pub(super) fn image(film: &Film) -> Image {
-    of_size(film, by_rows(film, |pixel| pixel.mean().to_array()).collect())
-}
-
-fn of_size(film: &Film, pixels: Vec<[f32; 3]>) -> Image {
-    Image { width: film.width(), height: film.height(), pixels }
-}
-
-/// `value` of all pixels, row by row.
-fn by_rows<'f, T: Send + 'f>(
-    film: &'f Film,
-    value: impl Fn(Pixel) -> T + Sync + Send + 'f,
-) -> impl IndexedParallelIterator<Item = T> + 'f {
-    let width = film.width() as usize;
-    let pixels = (0..width * film.height() as usize).into_par_iter();
-    pixels.map(move |i| value(film.pixel((i % width) as u32, (i / width) as u32)))
 }

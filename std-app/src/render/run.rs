@@ -26,8 +26,8 @@ use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, UNLIMITED};
 
 /// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. The calling thread calls
-/// `progress` after each round, outside the measured time. [`crate::Renderer`] renders several views of a scene
-/// with one build.
+/// `progress` after each round, outside the measured time. [`crate::Renderer`] renders several views of a
+/// scene with one build.
 pub fn render(
     scene: &Scene,
     settings: &Settings,
@@ -51,8 +51,8 @@ pub(crate) struct Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// Checks `settings` and the files that they name: those of another scene are refused before any structure
-    /// is built.
+    /// Checks `settings` and the files that they name: those of another scene are refused before any
+    /// structure is built.
     pub(crate) fn open(scene: &'a Scene<'a>, settings: &'a Settings) -> Result<Self, RenderError> {
         let pixels = u64::from(settings.width) * u64::from(settings.height);
         if !(1..=MOST_PIXELS).contains(&pixels) {

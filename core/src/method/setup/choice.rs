@@ -1,7 +1,7 @@
 //! Choice of a method for a picture whose method is left open: path tracing, unless another one has less
 //! predicted error ([`crate::method::choice`]).
 
-use super::{MethodKind, MethodPlan, MethodSetup, light_paths};
+use super::{MethodKind, MethodPlan, MethodSetup, counts};
 use crate::bsdf::Features;
 use crate::census::Census;
 use crate::findings::Finding;
@@ -38,7 +38,7 @@ pub(super) fn choose<'a: 'm, 'm, F: Features>(
     let light_paths = match trial.affords_light_paths(goal) {
         true => {
             let part = goal.part_of_pilot(context.pixels());
-            light_paths::choose::<F>(setup, (&techniques, part, trial.has_photons), memory, executor)?
+            counts::choose::<F>(setup, (&techniques, part, trial.has_photons), memory, executor)?
         }
         false => None,
     };

@@ -1,24 +1,13 @@
 //! Setup of bidirectional path tracing, light tracing, and vertex connection and merging. Path tracing takes
 //! their place where light paths do not pay.
 
+use super::counts::{choose, given};
 use super::{AnyMethod, Attempt, MethodKind, MethodPlan, MethodSetup, paths};
 use crate::bsdf::Features;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
-use crate::method::bidirectional::{Bidirectional, BidirectionalSettings};
+use crate::method::bidirectional::Bidirectional;
 use crate::method::counts::{self, Choice, pilot};
 use crate::method::{Executor, RenderMethod};
-
-/// Counts of `kind` as far as they are `given`; others are open.
-pub(super) fn given(kind: MethodKind, given: &BidirectionalSettings) -> BidirectionalSettings {
-    match kind {
-        MethodKind::LightTracing => {
-            let light_paths = given.light_paths;
-            BidirectionalSettings { light_paths, ..BidirectionalSettings::LIGHT_TRACING }
-        }
-        MethodKind::Bidirectional => BidirectionalSettings { merging: Some(false), ..*given },
-        _ => *given,
-    }
-}
 
 /// Working memory of a worker for `plan`.
 pub(super) fn scratch<F: Features>(plan: &MethodPlan<F>, setup: &MethodSetup) -> Footprint {
@@ -79,15 +68,4 @@ fn beside_paths<'a: 'm, 'm, F: Features>(
         Attempt::Ready(chosen) => Attempt::Ready(super::ChosenMethod { kind, findings, ..chosen }),
         Attempt::Instead(plan) => Attempt::Instead(MethodPlan { reported: kind, findings, ..plan }),
     })
-}
-
-/// The counts that suit the picture, where `given` leaves them open, by a pilot with one pixel for each
-/// `part` of the picture.
-pub(super) fn choose<'a: 'm, 'm, F: Features>(
-    setup: &MethodSetup<'a, '_>,
-    pilot: (&BidirectionalSettings, usize, bool),
-    memory: &mut impl MemorySource<'m>,
-    executor: &mut impl Executor,
-) -> Result<Option<Choice>, OutOfMemory> {
-    counts::choose::<F>(&setup.context, pilot, &mut memory.within(), executor)
 }

@@ -1,6 +1,7 @@
 //! Setup of a method: prepasses choose what is left open, then the method takes its memory.
 
 mod choice;
+mod counts;
 mod light_paths;
 mod memory;
 mod paths;
@@ -10,7 +11,7 @@ use super::cache_resolution::CachedPicture;
 use super::cached_paths::{CachedPathTracing, KeptCaches};
 use super::caustics::{self, CausticPathTracing, CausticUse};
 use super::choice::Goal;
-use super::counts::{self, Choice};
+use super::counts::Choice;
 use super::executor::Executor;
 use super::instant_radiosity::InstantRadiosity;
 use super::irradiance_cache::CacheSettings;
@@ -152,8 +153,9 @@ impl<'a, F: Features> MethodPlan<'a, F> {
         Self { findings, ..MethodKind::Path.into() }
     }
 
-    /// Memory of the method of `options` in its usual size, its prepasses included, for a picture of `size` of
-    /// `scene`; `None` leaves the method open. And working memory of a worker for all plans that it may lead to.
+    /// Memory of the method of `options` in its usual size, its prepasses included, for a picture of `size`
+    /// of `scene`; `None` leaves the method open. And working memory of a worker for all plans that it may
+    /// lead to.
     pub fn required_memory(
         kind: Option<MethodKind>,
         options: &MethodOptions,
@@ -192,7 +194,7 @@ impl<'a, F: Features> MethodPlan<'a, F> {
     pub fn scratch(&self, setup: &MethodSetup) -> Footprint {
         match self.kind {
             MethodKind::Path => match (self.is_open, setup.may_have_caustics()) {
-                (true, _) => super::choice::scratch::<F>().or(counts::scratch::<F>()),
+                (true, _) => super::choice::scratch::<F>().or(super::counts::scratch::<F>()),
                 (false, true) => caustics::scratch::<F>(),
                 (false, false) => PathTracing::<F>::scratch(),
             },

@@ -315,7 +315,6 @@ impl<'a, F: Features> LightWalk<'a, F> {
         if state.segments + 1 >= self.max_depth {
             return None;
         }
-
         let from = point.frame.to_local(-direction);
         // A diffuse surface has no specular lobe.
         if onward.specular_only && matches!(bsdf, Bsdf::Diffuse(_)) {
@@ -332,8 +331,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
             }
             false => Self::sample(numbers, first, (&bsdf, from), is_apart),
         };
-        let (sample, is_specular) =
-            sample.filter(|(_, is_specular)| *is_specular || !onward.specular_only)?;
+        let (sample, is_specular) = sample.filter(|(_, specular)| *specular || !onward.specular_only)?;
         let towards = point.frame.to_world(sample.direction);
         if !is_bent && !point.sides_agree(sample.direction, towards) {
             return None;
@@ -348,9 +346,9 @@ impl<'a, F: Features> LightWalk<'a, F> {
             false => scattered(power, &point, (direction, from), (towards, &sample)),
         };
         // Paths keep their power where possible: absorption ends paths instead.
-        let continuation_probability = (next.max_element() / power.max_element()).min(onward.most);
-        let continuation_probability =
-            continuation_probability.min(survival_limit(state.segments + 1) / state.survived);
+        let survival = survival_limit(state.segments + 1) / state.survived;
+        let kept = next.max_element() / power.max_element();
+        let continuation_probability = kept.min(onward.most).min(survival);
         if !(continuation_probability > 0.0 && roulette < continuation_probability && next.is_finite()) {
             return None;
         }

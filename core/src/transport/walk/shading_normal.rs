@@ -1,11 +1,10 @@
 //! Scattering of light subpaths at bent shading normals (Veach 1997, section 5.3).
 //!
 //! Camera paths define the light: the shading normal is the one that the viewer sees, which is turned to face
-//! a viewer below its horizon. The viewer of a light path is its next vertex, so that the path may leave to any
-//! direction above the triangle: it is sampled by the cosine to the normal of the triangle, and on surfaces
-//! that are not diffuse in half of the cases by the BSDF. The power changes by f cos θ of the light as that
-//! viewer sees it, times the ratio of the cosines to the triangle.
-
+//! a viewer below its horizon. The viewer of a light path is its next vertex, so that the path may leave to
+//! any direction above the triangle: it is sampled by the cosine to the normal of the triangle, and on
+//! surfaces that are not diffuse in half of the cases by the BSDF. The power changes by f cos θ of the light
+//! as that viewer sees it, times the ratio of the cosines to the triangle.
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::geometry::{Frame, Hit, Ray};
@@ -14,9 +13,8 @@ use crate::scene::SurfacePoint;
 use crate::transport::walk::context::SceneContext;
 use glam::Vec3;
 
-/// True if the shading normal at `point` is not that of the triangle, and all lobes of `bsdf` have a width and
-/// reflect.
-#[inline]
+/// True if the shading normal at `point` is not that of the triangle, and all lobes of `bsdf` have a width
+/// and reflect. line]
 pub(super) fn is_bent(point: &SurfacePoint, bsdf: &Bsdf) -> bool {
     point.frame.normal != point.geometric_normal
         && match bsdf {

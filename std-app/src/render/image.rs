@@ -1,0 +1,49 @@
+//! Images of a film.
+
+use super::gaps::{self, Sketch};
+use super::threads::Workers;
+use crate::save::Image;
+use halflight_core::film::{Film, Pixel};
+use halflight_core::method::{RenderState, Shard};
+use rayon::prelude::*;
+
+/// `image` of a film with these `samples` of each pixel, with filled gaps, and the number of pixels in tiles
+/// without samples.
+pub(super) fn without_gaps(
+    mut image: Image,
+    samples: &[u32],
+    (state, sketch, workers): (&RenderState, &Sketch, &Workers),
+) -> (Image, u64) {
+    // Other shards fill the gaps of a shard.
+    if state.shard != Shard::WHOLE || !state.samples.contains(&0) {
+        return (image, 0);
+    }
+    let mut known: Vec<bool> = samples.iter().map(|&count| count > 0).collect();
+    let gaps = known.iter().filter(|known| !**known).count() as u64;
+    if known.iter().all(|known| !known) {
+        for ([x, y], light) in sketch(workers) {
+            let index = y as usize * image.width as usize + x as usize;
+            (image.pixels[index], known[index]) = (light, true);
+        }
+    }
+    gaps::fill(&mut image, &known);
+    (image, gaps)
+}
+
+pub(super) fn image(film: &Film) -> Image {
+    of_size(film, by_rows(film, |pixel| pixel.mean().to_array()).collect())
+}
+
+pub(super) fn of_size(film: &Film, pixels: Vec<[f32; 3]>) -> Image {
+    Image { width: film.width(), height: film.height(), pixels }
+}
+
+/// `value` of all pixels, row by row.
+pub(super) fn by_rows<'f, T: Send + 'f>(
+    film: &'f Film,
+    value: impl Fn(Pixel) -> T + Sync + Send + 'f,
+) -> impl IndexedParallelIterator<Item = T> + 'f {
+    let width = film.width() as usize;
+    let pixels = (0..width * film.height() as usize).into_par_iter();
+    pixels.map(move |i| value(film.pixel((i % width) as u32, (i / width) as u32)))
+}
