@@ -14,6 +14,7 @@ use crate::findings::Findings;
 use crate::memory::OutOfMemory;
 
 /// A method with its structures in memory.
+#[expect(clippy::large_enum_variant, reason = "the core has no heap to box a variant in")]
 pub enum AnyMethod<'a, F> {
     /// Path tracing, with caustic photons where they pay.
     Paths(CausticPathTracing<'a, F>),

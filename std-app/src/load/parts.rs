@@ -6,7 +6,7 @@ use super::scene_file::EnvironmentChange;
 use super::{
     LoadError, LoadOptions, LoadedScene, PlacedMesh, SceneBuilder, View, memory_estimate, too_large,
 };
-use glam::{DVec3, Mat3};
+use glam::Mat3;
 use halflight_core::Rgb;
 use halflight_core::scene::{Material, PointLight};
 use std::path::Path;
@@ -85,7 +85,8 @@ impl SceneParts {
         let file = Path::new(name);
         let count = mesh.positions.len();
         let lists = [("normals", mesh.normals.len()), ("texture coordinates", mesh.texcoords.len())];
-        for (list, length) in lists.into_iter().filter(|(_, length)| *length != 0 && *length != count) {
+        let differs = |(_, length): &(&str, usize)| *length != 0 && *length != count;
+        if let Some((list, length)) = lists.into_iter().find(differs) {
             let problem = format!("the mesh has {length} {list} and {count} positions");
             return Err(LoadError::of_file(file, problem, "give one for each position, or none"));
         }
@@ -143,7 +144,7 @@ impl SceneParts {
         let sky = |radiance| EnvironmentChange { radiance, map: None, to_map: Mat3::IDENTITY };
         let mut loaded = builder.build(name, &options, environment.map(sky))?;
         loaded.files.clear();
-        let point = |user: glam::Vec3| loaded.transform.point(DVec3::from(user.as_dvec3()).to_array());
+        let point = |user: glam::Vec3| loaded.transform.point(user.as_dvec3().to_array());
         let factor = loaded.transform.intensity_factor() as f32;
         let placed = |light: PointLight| match light {
             PointLight::Point { position, intensity } => {

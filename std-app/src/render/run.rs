@@ -150,7 +150,7 @@ impl WithFeatures for Render<'_> {
             let mut own = memory.within();
             let ready = match method::set_up::<F>(plan, &setup, &mut own) {
                 Ok(Attempt::Instead(better)) => {
-                    plan = better;
+                    plan = *better;
                     continue;
                 }
                 Ok(Attempt::Ready(renderer)) => {

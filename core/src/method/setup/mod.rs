@@ -123,6 +123,7 @@ pub struct MethodPlan<'a, F> {
 }
 
 /// Outcome of setting a method up.
+#[expect(clippy::large_enum_variant, reason = "the core has no heap to box a variant in")]
 pub enum Attempt<'a, 'm, F> {
     /// The method, with its structures in memory.
     Ready(ChosenMethod<'m, F>),

@@ -39,7 +39,7 @@ pub(super) enum Attempt<'a, 'm, F> {
     /// The method, with its structures in memory.
     Ready(Box<dyn Renderer<F> + 'm>),
     /// A prepass prefers this plan, for which the memory of the attempt is to be released first.
-    Instead(MethodPlan<'a, F>),
+    Instead(Box<MethodPlan<'a, F>>),
 }
 
 /// Takes memory and sets up the method of `plan`.
@@ -58,7 +58,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     let mut executor = Threads::new(setup.workers, &mut scratch);
     let method = match plan.set_up(&core, memory, &mut executor)? {
         CoreAttempt::Ready(method) => method,
-        CoreAttempt::Instead(plan) => return Ok(Attempt::Instead(plan)),
+        CoreAttempt::Instead(plan) => return Ok(Attempt::Instead(plan.into())),
     };
     let keeper = match method.cached() {
         Some(_) => Some(CacheKeeper::new::<F>(loaded, setup, memory)?),
