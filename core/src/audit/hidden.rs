@@ -48,6 +48,11 @@ impl MethodAtWork<'_> {
         }
     }
 
+    /// True if the method may lack light.
+    pub fn may_lack_light(&self) -> bool {
+        self.techniques().is_some()
+    }
+
     /// Working memory of a worker for [`MethodAtWork::hidden_light`].
     pub fn scratch<F: Features>() -> Footprint {
         caustics::scratch::<F>().or(HiddenLight::scratch::<F>())

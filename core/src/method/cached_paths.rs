@@ -60,8 +60,8 @@ impl<'a, F: Features> CachedPathTracing<'a, F> {
         if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch }
     }
 
-    /// Caching for `context` that begins with the records of `kept`. A prepass for caustic photons runs if
-    /// `may_have_caustics`; `most_rays` limits its picture.
+    /// Caching for `context` that begins with the records of `kept`. A prepass for caustic photons runs
+    /// within the rays of the picture, or there are no `photons`.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `memory` has too little for the tables and [`CacheSettings::fewest`] records, or
@@ -69,22 +69,23 @@ impl<'a, F: Features> CachedPathTracing<'a, F> {
     pub fn new(
         context: &RenderContext<'a>,
         settings: CacheSettings,
-        (kept, may_have_caustics, most_rays): (&KeptCaches, bool, Option<f64>),
+        (kept, photons): (&KeptCaches, Result<Option<f64>, CausticUse>),
         memory: &mut impl MemorySource<'a>,
         executor: &mut impl Executor,
     ) -> Result<Self, OutOfMemory> {
         let fewest = kept.halves.iter().map(|half| half.records.len()).max().unwrap_or(0);
         let settings = CacheSettings { fewest: settings.fewest.max(fewest), ..settings };
-        let later = later(&settings, context.scene);
-        let (emission, mut caustics) = match may_have_caustics {
-            true => {
+        let later = least_memory(&settings, context.scene);
+        let (emission, mut caustics) = match photons {
+            Ok(most_rays) => {
                 // Memory is shared equally between records and photons.
                 let reserved = later.saturating_add(least_footprint().bytes());
                 let settings = CausticSettings { beside_records: true, reserved, most_rays };
                 find_caustics::<F>(context, settings, memory, executor)?
             }
-            false => (None, CausticUse::default()),
+            Err(without) => (None, without),
         };
+        let most_rays = photons.unwrap_or(None);
         let photons = match emission {
             Some(emission) => {
                 let settings = CausticSettings { beside_records: true, reserved: later, most_rays };
@@ -274,7 +275,7 @@ fn find_caustics<'a, F: Features>(
 
 /// Bytes to leave when caustic photons take memory: for tables, for the fewest records of each cache, and for
 /// other structures.
-fn later(settings: &CacheSettings, scene: &Scene) -> usize {
+pub(super) fn least_memory(settings: &CacheSettings, scene: &Scene) -> usize {
     let records = CacheBuilder::footprint(settings.fewest, settings.representation()).bytes();
     let tables = settings.gathering_footprint().and(settings.lobe_footprint(scene)).bytes();
     records.saturating_mul(2).saturating_add(tables).saturating_add(settings.reserve)

@@ -112,6 +112,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             kept: KeptCaches::default(),
             widens: true,
             has_fixed_records: false,
+            lacks_memory: false,
         };
         let mut plan = settings.method.kind().map_or_else(MethodPlan::open, MethodPlan::from);
         let method = loop {

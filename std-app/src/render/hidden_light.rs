@@ -18,15 +18,15 @@ pub(super) fn measure<F: Features>(
     kind: Method,
     findings: &Findings,
 ) -> Result<Option<HiddenLight>, RenderError> {
+    let method = MethodAtWork { kind, options: &setup.settings.options(), findings };
     let (workers, scratch) = (setup.workers, MethodAtWork::scratch::<F>());
     let lent = scratch.bytes().saturating_mul(workers.count());
-    if !caustics::are_possible(setup.scene) || lent > memory.available() {
+    if !(method.may_lack_light() && caustics::are_possible(setup.scene)) || lent > memory.available() {
         return Ok(None);
     }
     let mut own = memory.within();
     let mut scratch = own.take_each("hidden light", scratch, workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);
-    let method = MethodAtWork { kind, options: &setup.settings.options(), findings };
     let samples = setup.goal().samples;
     Ok(method.hidden_light::<F>(&setup.context(), samples, &mut own, &mut executor)?)
 }

@@ -33,6 +33,11 @@ pub fn scratch<F: Features>() -> Footprint {
         .or(CausticPhotonTracer::<F>::scratch())
 }
 
+/// Least memory of photons and their prepass in a scene of so many lights, beside `reserved` bytes.
+pub(super) fn least_memory(lights: usize, reserved: usize) -> usize {
+    prepass::least(lights, reserved)
+}
+
 /// Memory of a prepass and of photon maps for a picture of so many `pixels` with so many `lights`.
 pub(super) fn footprint(lights: usize, pixels: usize) -> Footprint {
     prepass::footprint(lights, pixels).and(photons::footprint(pixels))

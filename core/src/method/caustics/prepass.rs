@@ -58,6 +58,12 @@ fn lent(lights: usize, step: usize) -> Footprint {
     EmissionSampler::footprint(lights).and(stats).slice::<GuideSample>(step)
 }
 
+/// Least memory with which a prepass runs in a scene of so many lights, beside `reserved` bytes.
+pub(in crate::method) fn least(lights: usize, reserved: usize) -> usize {
+    let later = kept(lights).and(least_footprint()).bytes().saturating_add(reserved);
+    later.max(kept(lights).and(lent(lights, FIRST_TEST)).bytes())
+}
+
 /// Memory of a prepass whose steps have a light path for each of so many pixels.
 pub(in crate::method) fn footprint(lights: usize, pixels: usize) -> Footprint {
     let step = pixels.next_multiple_of(PATHS_PER_TASK).clamp(FIRST_TEST, STEP);

@@ -8,7 +8,7 @@ mod paths;
 
 use super::any::{AnyMethod, ChosenMethod};
 use super::cache_resolution::CachedPicture;
-use super::cached_paths::{CachedPathTracing, KeptCaches};
+use super::cached_paths::{self, CachedPathTracing, KeptCaches};
 use super::caustics::{self, CausticPathTracing, CausticUse};
 use super::choice::Goal;
 use super::counts::Choice;
@@ -46,12 +46,24 @@ pub struct MethodSetup<'a, 's> {
     pub widens: bool,
     /// True if gather rays and density of records are those of the options, since files hold the records.
     pub has_fixed_records: bool,
+    /// True if there is no room for the working memory of caustic photons.
+    pub lacks_memory: bool,
 }
 
 impl MethodSetup<'_, '_> {
     /// True if the scene can have caustics and photons are enabled.
     fn may_have_caustics(&self) -> bool {
+        !self.lacks_memory && self.has_caustics()
+    }
+
+    /// True if the scene can have caustics and photons are enabled, whether there is memory or not.
+    fn has_caustics(&self) -> bool {
         self.options.paths.caustics && caustics::are_possible(self.context.scene)
+    }
+
+    /// Use of photons that have no prepass.
+    fn without_prepass(&self) -> CausticUse {
+        CausticUse { lacks_memory: self.lacks_memory && self.has_caustics(), ..CausticUse::default() }
     }
 
     /// True if rays and density of records may be chosen: time alone ends the picture, and neither options
@@ -215,6 +227,32 @@ impl<'a, F: Features> MethodPlan<'a, F> {
         }
     }
 
+    /// Setup without caustic photons, where `workers` have too little memory for them within `available` bytes
+    /// beside the least that the method needs; otherwise `setup`.
+    pub fn within_memory<'s>(
+        &self,
+        setup: MethodSetup<'a, 's>,
+        workers: usize,
+        available: usize,
+    ) -> MethodSetup<'a, 's> {
+        let without = MethodSetup { lacks_memory: true, ..setup };
+        let [scratch, least_scratch] =
+            [&setup, &without].map(|setup| self.scratch(setup).bytes().saturating_mul(workers));
+        let may_have = match self.kind {
+            MethodKind::IrradianceCache | MethodKind::RadianceCache => {
+                let settings = setup.settings_for(self.kind, self.picture);
+                let least = cached_paths::least_memory(&settings, setup.context.scene);
+                // Records and photons share the memory equally, and records keep at least half of it.
+                let reserved = least.saturating_add(caustics::least_footprint().bytes());
+                let photons = caustics::least_memory(setup.context.lights.count(), reserved);
+                let rest = available.saturating_sub(least_scratch.saturating_add(least));
+                available.checked_sub(scratch.saturating_add(photons)).is_some_and(|left| left >= rest / 2)
+            }
+            _ => scratch <= available,
+        };
+        if may_have { setup } else { without }
+    }
+
     /// Takes memory and sets up the method.
     ///
     /// # Errors
@@ -238,8 +276,12 @@ impl<'a, F: Features> MethodPlan<'a, F> {
             }
             MethodKind::IrradianceCache | MethodKind::RadianceCache => {
                 let settings = setup.settings_for(kind, self.picture);
-                let prepass = (&setup.kept, setup.may_have_caustics(), goal.rays);
-                AnyMethod::Cached(CachedPathTracing::new(context, settings, prepass, memory, executor)?)
+                let photons = match setup.may_have_caustics() {
+                    true => Ok(goal.rays),
+                    false => Err(setup.without_prepass()),
+                };
+                let begin = (&setup.kept, photons);
+                AnyMethod::Cached(CachedPathTracing::new(context, settings, begin, memory, executor)?)
             }
             MethodKind::PhotonMap => {
                 AnyMethod::PhotonMap(PhotonMapping::new(context, options.photons, reserve, memory, executor)?)

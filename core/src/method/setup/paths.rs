@@ -6,7 +6,7 @@ use super::{AnyMethod, Attempt, MethodKind, MethodPlan, MethodSetup};
 use crate::bsdf::Features;
 use crate::memory::{MemorySource, OutOfMemory};
 use crate::method::Executor;
-use crate::method::caustics::{CausticPathTracing, CausticSettings, CausticUse};
+use crate::method::caustics::{CausticPathTracing, CausticSettings};
 use crate::method::path::PathTracing;
 
 /// Path tracing, with caustic photons if they pay; with the paths of `plan` alone if a prepass has made them.
@@ -24,7 +24,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     let has_prepass = setup.may_have_caustics();
     let paths = PathTracing::<F>::new(&setup.context, setup.options.paths.reuse, executor)?;
     let mut method = match has_prepass {
-        false => CausticPathTracing::without_photons(paths, CausticUse::default()),
+        false => CausticPathTracing::without_photons(paths, setup.without_prepass()),
         true => {
             let settings = CausticSettings {
                 beside_records: false,

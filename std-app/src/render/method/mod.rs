@@ -50,6 +50,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
 ) -> Result<Attempt<'a, 'm, F>, RenderError> {
     let loaded = LoadedCaches::open(plan.kind(), setup, memory)?;
     let core = setup.of_core::<F>(loaded.kept());
+    let core = plan.within_memory(core, setup.workers.count(), memory.available());
     let mut scratch = memory.take_each("paths", plan.scratch(&core), setup.workers.count())?;
     #[cfg(test)]
     if setup.settings.is_wrong {
@@ -115,6 +116,7 @@ impl<'a> RenderSetup<'a> {
             kept,
             widens: !keeps_records,
             has_fixed_records: settings.load_cache.is_some() || keeps_records,
+            lacks_memory: false,
         }
     }
 }
