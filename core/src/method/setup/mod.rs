@@ -227,8 +227,8 @@ impl<'a, F: Features> MethodPlan<'a, F> {
         }
     }
 
-    /// Setup without caustic photons, where `workers` have too little memory for them within `available` bytes
-    /// beside the least that the method needs; otherwise `setup`.
+    /// Setup without caustic photons, where `workers` have too little memory for them within `available`
+    /// bytes beside the least that the method needs; otherwise `setup`.
     pub fn within_memory<'s>(
         &self,
         setup: MethodSetup<'a, 's>,

@@ -4,13 +4,6 @@
 #![forbid(unsafe_code)]
 
 /// Stands in for the macro of `std`, which is not there.
-macro_rules! print {
-    ($($anything:tt)*) => {
-        ()
-    };
-}
-
-/// Likewise.
 macro_rules! println {
     ($($anything:tt)*) => {
         ()
