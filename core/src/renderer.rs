@@ -6,14 +6,16 @@ mod of_features;
 mod rounds;
 mod settings;
 
+pub use crate::audit::{AuditWork, Audited, ErrorReport, NoiseAndBlur, Region};
+#[doc(hidden)]
 pub use audited::OutOfReach;
 pub use error::RenderError;
 pub use of_features::FeatureRenderer;
+#[doc(hidden)]
 pub use rounds::{Estimates, Plan, Rounds, Stop, StopRule};
 pub use settings::{RequiredMemory, Settings, Until};
 
 use crate::Rgb;
-use crate::audit::{Audited, ErrorReport};
 use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::census::{Census, FeatureSet};
 use crate::estimate::ErrorEstimate;
