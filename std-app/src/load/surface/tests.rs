@@ -73,9 +73,14 @@ fn pm_and_illum_make_metals_and_mirrors() {
 fn precise_statements_override_illum() {
     // Blender's metals: the colour is `Kd`, `Ks` a grey specular.
     let gold = "Kd 0.8 0.6 0.2\nKs 0.5 0.5 0.5\nNs 250\nNi 1.45\n";
-    for pbr in ["Pr 0.5\nPm 1", "Pr 0.5\nPm 0.5", "Pr 0.2\nPm 0.1", "Pr 0\nPm 1"] {
+    for pbr in ["Pr 0.5\nPm 1", "Pr 0.5\nPm 0.5", "Pr 0.2\nPm 0.1"] {
         assert_eq!(surface(&format!("{gold}{pbr}\nillum 3")), surface(&format!("{gold}{pbr}\nillum 2")));
     }
+    // Without roughness `illum 3` is equal at all angles, and `illum 2` has Fresnel's law.
+    let mirror = Surface::Mirror { reflectance: rgb(0.8, 0.6, 0.2) };
+    assert_eq!(surface(&format!("{gold}Pr 0\nPm 1\nillum 3")), mirror);
+    let smooth = Surface::Conductor { reflectance: rgb(0.8, 0.6, 0.2), roughness: 0.0.into() };
+    assert_eq!(surface(&format!("{gold}Pr 0\nPm 1\nillum 2")), smooth);
     let reflection = |roughness: f32| Surface::Glossy {
         base: rgb(0.375, 0.25, 0.125),
         specular: rgb(0.125, 0.125, 0.125),
