@@ -16,7 +16,7 @@
 //! if let Some(error) = picture.error {
 //!     println!("relMSE {:.1e}, 95 %: {:.1e} to {:.1e}", error.relmse, error.lower, error.upper);
 //! }
-//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! # Ok::<(), Box<dyn core::error::Error + Send + Sync>>(())
 //! ```
 #![forbid(unsafe_code)]
 

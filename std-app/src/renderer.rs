@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// let stop = Stop { error: Some(1e-3), ..Stop::default() };
 /// let picture = renderer.render(&Settings { stop, ..Settings::default() })?;
 /// halflight::save::write("cornell.png".as_ref(), &picture.image)?;
-/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// # Ok::<(), Box<dyn core::error::Error + Send + Sync>>(())
 /// ```
 pub struct Renderer {
     scene: BuiltScene,
