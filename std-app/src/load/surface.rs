@@ -11,6 +11,7 @@ use super::relief::Relief;
 use super::texture_set::TextureSet;
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Material, ScalarInput, Surface};
+use inputs::hides_map;
 
 /// Relative difference of `Ks` and the Fresnel reflectance of `Ni` up to which a coat is a dielectric: files
 /// have two or three digits.
@@ -140,21 +141,22 @@ impl Resolver<'_> {
             None => mtl.has_map(MapKind::Diffuse),
         };
         let is_phong = is_phong && !is_pbr(mtl) && mtl.metallic.is_none();
-        let has_map = |kind| mtl.has_map(kind);
-        let absent = |kind| if has_map(kind) { 1.0 } else { 0.0 };
-        // As in `factor`, 0 beside a map is 1.
-        let value = |given: Option<[f64; 3]>, kind| match given {
-            Some(value) if !(has_map(kind) && value == [0.0; 3]) => value,
-            _ => [absent(kind); 3],
+        let value = |given: Option<[f64; 3]>, kind| match (given, mtl.has_map(kind)) {
+            (Some(value), has_map) if !hides_map(value, has_map) => value,
+            (_, has_map) => [if has_map { 1.0 } else { 0.0 }; 3],
         };
         let (kd, ks) = (value(mtl.diffuse, MapKind::Diffuse), value(mtl.specular, MapKind::Specular));
-        let is_grey_map = |map: &Map| self.textures.relief(map) == Some(Relief::Heights);
         let is_grey = ks.iter().all(|x| (x - ks[0]).abs() <= GREY);
-        let is_grey = is_grey && mtl.map(MapKind::Specular).is_none_or(is_grey_map);
         // Dielectrics reflect less than `LEVEL`.
         let is_too_much =
             ks[0] > f64::from(LEVEL) && kd.iter().zip(ks).any(|(kd, ks)| kd + ks > MOST_REFLECTANCE);
-        let is_level = is_phong && !mtl.surely_reflects && is_grey && is_too_much;
+        // The map is last, since its texels are sampled.
+        let is_grey_map = |map: &Map| self.textures.relief(map) == Some(Relief::Heights);
+        let is_level = is_phong
+            && !mtl.surely_reflects
+            && is_grey
+            && is_too_much
+            && mtl.map(MapKind::Specular).is_none_or(is_grey_map);
         if is_level {
             let (name, sum) = (&mtl.name, kd[0].max(kd[1]).max(kd[2]) + ks[0]);
             let note = format!(

@@ -12,6 +12,11 @@ use halflight_core::scene::{ColorInput, NormalMap, ScalarInput};
 /// joints a centimetre deep.
 const DEFAULT_BUMP: f64 = 0.01;
 
+/// True if a factor would hide its map. Exporters write 0 if only the map counts.
+pub(super) fn hides_map<const N: usize>(factor: [f64; N], has_map: bool) -> bool {
+    has_map && factor == [0.0; N]
+}
+
 impl Resolver<'_> {
     /// `Kd`; by default white under a map, black beside a `Ks` or `Ke`, else grey.
     pub(super) fn diffuse(&mut self) -> ColorInput {
@@ -58,8 +63,7 @@ impl Resolver<'_> {
         ColorInput { value, texture }
     }
 
-    /// The factor on a map, or the value without one. Exporters write 0 if only the map counts, so 0 becomes
-    /// 1.
+    /// The factor on a map, or the value without one; 1 where it hides the map.
     pub(super) fn factor<const N: usize>(
         &mut self,
         what: &str,
@@ -68,7 +72,7 @@ impl Resolver<'_> {
         has_map: bool,
     ) -> [f64; N] {
         let factor = given.unwrap_or(absent);
-        if !(has_map && factor == [0.0; N]) {
+        if !hides_map(factor, has_map) {
             return factor;
         }
         let name = &self.mtl.name;
