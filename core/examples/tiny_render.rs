@@ -2,7 +2,7 @@
 //! threads, and an operating system only to print. `cargo verify targets` runs this very file without
 //! libc, as WebAssembly and for Cortex-M: same bits everywhere.
 #[path = "room/mod.rs"]
-mod room;
+pub mod room;
 
 use halflight_core::{
     Arena, BidirectionalSettings, CacheOptions, Level, Line, LobeSettings, Loop, Method, MetropolisSettings,
@@ -19,7 +19,6 @@ const COUNTS: BidirectionalSettings =
     BidirectionalSettings { light_paths: Some(1024), connections: Some(1), merging: Some(false) };
 const CACHE: CacheOptions = CacheOptions { strata: Some(8), records: Some(512), ..CacheOptions::DEFAULT };
 const LOBES: LobeSettings = LobeSettings { tolerance: 0.05, degree: 2, ..LobeSettings::DEFAULT };
-/// All methods.
 pub const METHODS: [Method; 10] = [
     Method::Path(PathOptions::PLAIN),
     Method::LightTracing(COUNTS),
@@ -33,13 +32,11 @@ pub const METHODS: [Method; 10] = [
     Method::RadianceCache(CACHE, LOBES),
 ];
 
-pub use room::fingerprint;
-
 /// Renders eight samples of each pixel of the room by `method`, row by row from the top, all in `memory`.
 pub fn render(method: Method, memory: &mut [Line], pixels: &mut [Rgb]) -> Result<(), RenderError> {
     let scene = room::with_metal_wall();
-    let settings = Settings::new([SIZE as u32; 2]).with_method(method);
-    let settings = Settings { level: Level::BASELINE, audit: Some(0.0), ..settings };
+    let usual = Settings::new([SIZE as u32; 2]).with_method(method);
+    let settings = Settings { level: Level::BASELINE, audit: Some(0.0), ..usual };
     let mut arena = Arena::over(memory);
     let scratch = Renderer::required_memory(&scene, &settings).scratch.min(arena.available() / 2);
     let mut executor = Loop::new(arena.slice(scratch)?);
@@ -57,6 +54,6 @@ fn main() {
             let shade = |pixel: &Rgb| char::from(b" .:-=+*#%@"[(12.0 * pixel.y).min(9.0) as usize]);
             println!("{}", row.iter().map(shade).collect::<String>());
         }
-        println!("{}\n{:016x}", method.name(), fingerprint(&pixels));
+        println!("{}\n{:016x}", method.name(), room::fingerprint(&pixels));
     }
 }

@@ -21,7 +21,8 @@ macro_rules! vec {
 #[path = "../../../../core/examples/tiny_render.rs"]
 mod example;
 
-use example::{METHODS as ALL, SIZE, fingerprint, render};
+use example::room::fingerprint;
+use example::{METHODS as ALL, SIZE, render};
 use halflight_core::Rgb;
 use halflight_core::memory::Line;
 
