@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The installed browser; without one, a message that the test is skipped.
-pub fn browser() -> Option<&'static str> {
+pub(crate) fn browser() -> Option<&'static str> {
     let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
         let version =
             Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
@@ -17,10 +17,10 @@ pub fn browser() -> Option<&'static str> {
 }
 
 /// A directory of its own, removed if the test passes.
-pub struct Folder(pub PathBuf);
+pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
-    pub fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("halflight-report-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         Self(folder)
@@ -36,7 +36,7 @@ impl Drop for Folder {
 }
 
 /// Console lines after `page` ran with `script` at its end, and the document then.
-pub fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> (Vec<String>, String) {
+pub(crate) fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> (Vec<String>, String) {
     let file = folder.join("page.html");
     std::fs::write(&file, page.replace("</body>", &format!("<script>{script}</script></body>"))).unwrap();
     let output = Command::new(browser)
@@ -55,7 +55,7 @@ pub fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> (Vec<St
 /// Script that runs once the page is ready, with helpers; `note(name, value)` adds a line to the document.
 ///
 /// `pointer(type)` is an event at the centre of the pixel of a picture of `size` × `size`, `colour()` its colour.
-pub fn probe(size: u32, [x, y]: [u32; 2], script: &str) -> String {
+pub(crate) fn probe(size: u32, [x, y]: [u32; 2], script: &str) -> String {
     format!(
         "(async () => {{
             const probe = document.body.appendChild(document.createElement('pre'));
@@ -70,8 +70,16 @@ pub fn probe(size: u32, [x, y]: [u32; 2], script: &str) -> String {
                     clientX: left + ({x} + 0.5) / {size} * width, clientY: top + ({y} + 0.5) / {size} * height }});
             }};
             const key = (name) => view.dispatchEvent(new KeyboardEvent('keydown', {{ key: name, bubbles: true }}));
-            const values = () => all('#readout tbody tr').map((row) => row.textContent).join('|');
-            const colour = () => view.querySelector('canvas').getContext('2d').getImageData({x}, {y}, 1, 1).data.join();
+            const values = () => all('#readout tbody tr')
+                .map((row) => [...row.cells].map((cell) => cell.textContent).join(' ')).join('|');
+            const colour = () => {{
+                const shown = view.querySelector('canvas');
+                const copy = document.createElement('canvas');
+                Object.assign(copy, {{ width: shown.width, height: shown.height }});
+                const context = copy.getContext('2d', {{ willReadFrequently: true }});
+                context.drawImage(shown, 0, 0);
+                return context.getImageData({x}, {y}, 1, 1).data.join();
+            }};
             {script}
             note('done', 'yes');
         }})();"
@@ -79,15 +87,15 @@ pub fn probe(size: u32, [x, y]: [u32; 2], script: &str) -> String {
 }
 
 /// Value of a line that a probe has added to the document.
-pub fn noted<'d>(document: &'d str, name: &str) -> &'d str {
+pub(crate) fn noted<'d>(document: &'d str, name: &str) -> &'d str {
     let start = document.find(&format!("@{name}=")).unwrap_or_else(|| panic!("no {name} in the probe"));
     let line = document[start..].split('\n').next().unwrap();
     line.split_once('=').unwrap().1
 }
 
 /// Numbers of a text, in the form of the page.
-pub fn numbers(text: &str) -> Vec<f32> {
-    let plain = text.replace('−', "-").replace(" × 10", "e");
+pub(crate) fn numbers(text: &str) -> Vec<f32> {
+    let plain = text.replace('−', "-").replace("&nbsp;×&nbsp;10", "e");
     let digit = |c: char| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|raised| raised == c);
     let plain: String = plain
         .chars()
@@ -96,4 +104,3 @@ pub fn numbers(text: &str) -> Vec<f32> {
     let words = plain.split(|c: char| !(c.is_ascii_digit() || ".-e".contains(c)));
     words.filter_map(|word| word.parse().ok()).collect()
 }
-

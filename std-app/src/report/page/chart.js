@@ -6,7 +6,7 @@ const STYLES = 6;
 const MIN_DISTANCE = 0.004;
 const MAX_MARKS = 40;
 
-const MARGIN = { left: 62, right: 14, top: 12, bottom: 46 };
+const MARGIN = { left: 74, right: 14, top: 12, bottom: 46 };
 
 const isPositive = (value) => value > 0 && Number.isFinite(value);
 
@@ -155,7 +155,7 @@ const drawing = (drawn, leads, [xAxis, yAxis], width, height) => {
       labelled && label("beside", left - 8, y(e) + 4.5, tickLabel(e)),
     ]).flat(),
     label("below", (left + end) / 2, height - 6, "seconds of rendering"),
-    svg("text", { class: "below", transform: `translate(14 ${(top + floor) / 2}) rotate(-90)` }, "relMSE"),
+    svg("text", { class: "below", transform: `translate(10 ${(top + floor) / 2}) rotate(-90)` }, "relMSE"),
     drawn.map(curve).flat(),
     leads.map(({ from, to, style, name }) =>
       svg("rect", { class: `lead ${style}`, x: x(from), y: floor - 7, width: Math.max(0, x(to) - x(from)), height: 7 },

@@ -16,13 +16,15 @@ const decode = async ({ data, width, height, channels }) => {
 // Mean over squares of 3 × 3 pixels, twice: a variance from two halves is itself off by a factor, and two passes
 // turn a bright pixel into a soft spot.
 const smoothed = (values, width, height, channels) => {
-  const along = (from, size, count, step, stride) => {
+  // Means of three neighbours along `count` lines of `size` pixels.
+  const along = (from, size, step, count, stride) => {
     const to = new Float32Array(from.length);
     for (let line = 0; line < count; line++) {
       for (let channel = 0; channel < channels; channel++) {
         const start = line * stride + channel;
         for (let i = 0; i < size; i++) {
-          const [first, last] = [Math.max(0, i - 1), Math.min(size - 1, i + 1)];
+          const first = Math.max(0, i - 1);
+          const last = Math.min(size - 1, i + 1);
           let sum = 0;
           for (let near = first; near <= last; near++) sum += from[start + near * step];
           to[start + i * step] = sum / (last - first + 1);
@@ -31,7 +33,8 @@ const smoothed = (values, width, height, channels) => {
     }
     return to;
   };
-  const pass = (from) => along(along(from, width, height, channels, width * channels), height, width, width * channels, channels);
+  const [pixel, row] = [channels, width * channels];
+  const pass = (from) => along(along(from, width, pixel, height, row), height, row, width, pixel);
   return pass(pass(values));
 };
 
@@ -88,7 +91,7 @@ const scales = {
     const sizes = values.map(Math.abs).filter((size) => size > 0 && Number.isFinite(size)).sort();
     if (sizes.length === 0) return null;
     const end = quantile(sizes, 0.995);
-    return { stops: SIGNED, labels: [-end, 0, end], position: (value) => 0.5 + value / end / 2 };
+    return { stops: SIGNED, labels: [-end, 0, end], position: (value) => 0.5 + (value / end / 2 || 0) };
   },
 };
 
@@ -173,82 +176,100 @@ class Records extends Layer {
   }
 }
 
-// Layer with one value for each pixel of `raw`.
-const derived = (raw, value, properties) => {
-  const values = Float32Array.from({ length: raw.width * raw.height }, (_, pixel) => value(pixel));
-  return new Layer({ ...raw, channels: 1, values }, properties);
-};
-
 const UNIT = "W/(m² sr)";
 
-// Maps by their key: title, text, scale, and the text of a value.
+// Title, text, scale, text of a value, and its unit, of maps by their key.
 const MAPS = {
-  standard: ["Standard error", "Standard deviation of the mean of each pixel.", "log", (v) => `${number(v, 2)} ${UNIT}`],
+  standard: ["Standard error", `Standard deviation of the mean of each pixel, in ${UNIT}.`, "log", (v) => number(v, 2), ` ${UNIT}`],
   relative: ["Relative error", "Standard error over the brightness of the pixel, as in relMSE: bright pixels dominate the error.", "log", (v) => percent(v)],
-  variance: ["Variance of a sample", "Noise of the light for any number of samples.", "log", (v) => `${number(v, 2)} (${UNIT})²`],
+  variance: ["Variance of a sample", `Noise of the light for any number of samples, in (${UNIT})².`, "log", (v) => number(v, 2)],
   samples: ["Samples", "Samples of each pixel.", "linear", (v) => grouped(Math.round(v))],
   bias: ["Bias", "Relative deviation of regions: blue is too dark, red is too bright, white is within two standard errors. One unbiased region in twenty has a colour.", "signed", signedPercent],
   difference: ["Relative difference", "Blue is too dark, red is too bright. The mean square is the relMSE.", "signed", signedPercent],
   flip: ["FLIP", "Visible difference of the PNGs at 67 pixels per degree, from 0 (none) to 1 (largest).", "unit", (v) => number(v, 2)],
   records: ["Records", "Records of the cache of even samples: dots are records, lines are the borders of their validity.", "records", (v) => ["none", "border", "record"][v]],
-  radii: ["Radii", "Mean validity radius of the records at a pixel. Black pixels have no record and are path traced.", "log", (v) => (v > 0 ? `${number(v, 2)} pixels` : "no record")],
+  radii: ["Radii", "Mean validity radius of the records at a pixel, in pixels. Black pixels have no record and are path traced.", "log", (v) => number(v, 2)],
   predicted: ["Predicted error", "Error that the records predict, relative to the irradiance.", "log", (v) => (Number.isNaN(v) ? "no record" : percent(v))],
-  achieved: ["True error", "Relative error at the test points: blue is too dark, red is too bright, white was not tested.", "signed", (v) => (v === 0 ? "not tested" : signedPercent(v))],
+  achieved: ["True error", "Relative error at the test points: blue is too dark, red is too bright, white was not tested.", "signed", signedPercent],
 };
 for (const [key, name] of [["photon", "photons"], ["caustic_photon", "caustic photons"]]) {
-  MAPS[`${key}s`] = [`Visible ${name}`, "Photons per pixel, except behind glass and in mirrors", "log", (v) => `${grouped(v)} per pixel`];
-  MAPS[`${key}_density`] = [`Density of ${name}`, "Photons per square metre of surface, from the nearest 64. Glass and mirrors hold no photons and show the density nearby.", "log", (v) => `${number(v, 2)} /m²`];
-  MAPS[`${key}_radius`] = [`Radius of ${name}`, "Radius of the nearest 64: the blur of an estimate from as many photons.", "log", (v) => `${number(v, 2)} m`];
+  const counts = (v) => number(v, 2);
+  MAPS[`${key}s`] = [`Visible ${name}`, "Photons per pixel, except behind glass and in mirrors", "log", counts];
+  MAPS[`${key}_density`] = [`Density of ${name}`, "Photons per square metre of surface, from the nearest 64. Glass and mirrors hold no photons and show the density nearby.", "log", counts, " /m²"];
+  MAPS[`${key}_radius`] = [`Radius of ${name}`, "Radius of the nearest 64 in metres: the blur of an estimate from as many photons.", "log", counts, " m"];
 }
 
 const mapProperties = (key) => {
-  const [title, text, scale, format] = MAPS[key];
-  return { key, title, text, scale, format };
+  const [title, text, scale, label, unit = ""] = MAPS[key];
+  return { key, title, text, scale, label, format: (value) => label(value) + unit };
 };
 
-// Layers of a render by key, with `picture` and the `reference`, if there is one. `picture.errors` are standard
-// errors of its channels.
+// Map of one value for each pixel of `raw`.
+const derived = (key, raw, values) => new Layer({ ...raw, channels: 1, values }, mapProperties(key));
+
+// Maps of the estimated error: `errors` are standard errors of the channels of `picture`.
+const errorMaps = (run, picture, errors, samples) => {
+  const { values, width, height } = picture;
+  const whole = mean(run.mean_radiance);
+  const floor = 0.01 * whole * whole;
+  const [absolute, relative, ofSample] = [0, 1, 2].map(() => new Float32Array(width * height));
+  for (let pixel = 0; pixel < width * height; pixel++) {
+    for (let i = 3 * pixel; i < 3 * pixel + 3; i++) {
+      const variance = (errors[i] * errors[i]) / 3;
+      absolute[pixel] += variance;
+      relative[pixel] += variance / (values[i] * values[i] + floor);
+    }
+    ofSample[pixel] = absolute[pixel] * (samples ? samples.values[pixel] : run.samples[0]);
+  }
+  const flat = (map) => smoothed(map, width, height, 1);
+  return {
+    standard: derived("standard", picture, flat(absolute).map(Math.sqrt)),
+    relative: derived("relative", picture, flat(relative).map(Math.sqrt)),
+    variance: derived("variance", picture, flat(ofSample)),
+  };
+};
+
+// Map of the deviations of regions that an audit finds.
+const biasMap = ({ regions }, picture) => {
+  const { width, height, covers } = picture;
+  const shown = regions.filter(({ mean, error }) => Math.abs(mean) > 2 * error);
+  const within = (at, start, size) => at >= start && at < start + size;
+  const values = Float32Array.from({ length: width * height }, (_, pixel) => {
+    const x = ((pixel % width + 0.5) * covers[0]) / width;
+    const y = ((Math.floor(pixel / width) + 0.5) * covers[1]) / height;
+    return shown.find((one) => within(x, one.x, one.width) && within(y, one.y, one.height))?.mean ?? 0;
+  });
+  return derived("bias", picture, values);
+};
+
+// Map of (I − R) / √(R² + 0.01 m²), whose mean square is the relMSE; m is the mean of the reference R.
+const differenceMap = (run, picture, reference) => {
+  const finite = () => mean([...reference.values.filter(Number.isFinite)]);
+  const floor = 0.01 * (run.error.reference_mean ?? finite()) ** 2;
+  const values = new Float32Array(picture.width * picture.height);
+  for (let i = 0; i < 3 * values.length; i++) {
+    const [a, b] = [picture.values[i], reference.values[i]];
+    // 0 / 0, a black pixel of a black reference, is no error.
+    if (a !== b) values[Math.floor(i / 3)] += (a - b) / Math.sqrt(b * b + floor) / 3;
+  }
+  return derived("difference", picture, values);
+};
+
+// Layers of a render by key. `picture.errors` are the standard errors of its channels.
 const layersOf = (run, raws, reference) => {
   const raw = Object.fromEntries(raws.map((one) => [one.name, one]));
   const layers = { picture: new Layer(raw.picture, { key: "picture", title: "Picture" }) };
-  const { values, width, height } = raw.picture;
-  const add = (key, value, from = raw.picture) => { layers[key] = derived(from, value, mapProperties(key)); };
-  const channels = (of, pixel) => [0, 1, 2].map((c) => of(3 * pixel + c));
-  const whole = mean(run.mean_radiance);
   if (raw.error) {
-    const variance = raw.error.values.map((error) => error * error);
-    const floor = 0.01 * whole * whole;
-    const flat = (value) => smoothed(Float32Array.from({ length: width * height }, (_, pixel) => value(pixel)), width, height, 1);
-    const absolute = flat((pixel) => mean(channels((i) => variance[i], pixel)));
-    const relative = flat((pixel) => mean(channels((i) => variance[i] / (values[i] ** 2 + floor), pixel)));
-    const ofSample = flat((pixel) =>
-      mean(channels((i) => variance[i], pixel)) * (raw.samples ? raw.samples.values[pixel] : run.samples[0]));
-    layers.picture.errors = new Layer({ ...raw.error, values: smoothed(variance, width, height, 3).map(Math.sqrt) }, {});
-    add("standard", (pixel) => Math.sqrt(absolute[pixel]));
-    add("relative", (pixel) => Math.sqrt(relative[pixel]));
-    add("variance", (pixel) => ofSample[pixel]);
+    const { values, width, height } = raw.error;
+    const variance = smoothed(values.map((error) => error * error), width, height, 3);
+    layers.picture.errors = new Layer({ ...raw.error, values: variance.map(Math.sqrt) }, {});
+    Object.assign(layers, errorMaps(run, raw.picture, values, raw.samples));
   }
-  if (run.error.bias?.found) {
-    const shown = run.error.bias.regions.filter(({ mean, error }) => Math.abs(mean) > 2 * error);
-    const [across, down] = [raw.picture.covers[0] / width, raw.picture.covers[1] / height];
-    add("bias", (pixel) => {
-      const [x, y] = [(pixel % width + 0.5) * across, (Math.floor(pixel / width) + 0.5) * down];
-      return shown.find((r) => x >= r.x && x < r.x + r.width && y >= r.y && y < r.y + r.height)?.mean ?? 0;
-    });
-  }
-  if (reference) {
-    const floor = 0.01 * mean(reference.values) ** 2;
-    const difference = (i) => {
-      const [a, b] = [values[i], reference.values[i]];
-      return a === b ? 0 : (a - b) / Math.sqrt(b * b + floor);
-    };
-    add("difference", (pixel) => mean(channels(difference, pixel)));
-  }
+  if (run.error.bias?.found) layers.bias = biasMap(run.error.bias, raw.picture);
+  if (reference) layers.difference = differenceMap(run, raw.picture, reference);
   for (const [name, one] of Object.entries(raw).filter(([name]) => name in MAPS)) {
     layers[name] = new (name === "records" ? Records : Layer)(one, { ...mapProperties(name), picture: layers.picture });
-    if (one.visible !== null && name.endsWith("photons")) {
-      layers[name].text += `: ${percent(one.visible)} of all are visible.`;
-    }
+    if (name.endsWith("photons")) layers[name].text += `: ${percent(one.visible)} of all are visible.`;
   }
   return layers;
 };

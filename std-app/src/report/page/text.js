@@ -20,7 +20,7 @@ const number = (value, digits = 3) => {
   const sign = value < 0 ? "−" : "";
   if (!Number.isFinite(value)) return sign + "∞";
   const [mantissa, exponent] = Math.abs(value).toExponential(digits - 1).split("e");
-  if (exponent < -2 || exponent > 3) return `${sign}${mantissa} × ${powerOfTen(Number(exponent))}`;
+  if (exponent < -2 || exponent > 3) return `${sign}${mantissa}\u00a0×\u00a0${powerOfTen(Number(exponent))}`;
   return sign + Math.abs(value).toFixed(Math.max(0, digits - 1 - exponent));
 };
 

@@ -8,7 +8,7 @@ const VISIBLE = [0.15, 1.5];
 
 const EXPOSURE_STEP = 0.25;
 
-// Stops beyond which an exposure is not changed.
+// Stops by which the exposure that is chosen can be changed, at least.
 const EXPOSURE_RANGE = 8;
 
 // Exposure in stops at which a picture can be seen.
@@ -29,9 +29,9 @@ const stopsText = (stops) =>
   `${stops > 0 ? "+" : ""}${String(stops).replace("-", "−")} ${Math.abs(stops) === 1 ? "stop" : "stops"}`;
 
 // Bar of a colour scale with its labels.
-const scaleBar = (range, format) => {
+const scaleBar = (range, layer) => {
   const colours = range.stops.map((stop) => `rgb(${stop.join(" ")})`).join(",");
-  const bar = el("div", { class: "scale" }, range.labels.map((label) => el("span", {}, format(label))));
+  const bar = el("div", { class: "scale" }, range.labels.map((value) => el("span", {}, layer.label(value))));
   bar.style.setProperty("--colours", colours);
   return bar;
 };
@@ -95,7 +95,8 @@ class Viewer {
 
   sliders() {
     this.exposure = find("#exposure input");
-    Object.assign(this.exposure, { min: this.automatic - EXPOSURE_RANGE, max: this.automatic + EXPOSURE_RANGE });
+    const [min, max] = [this.automatic - EXPOSURE_RANGE, this.automatic + EXPOSURE_RANGE];
+    Object.assign(this.exposure, { min: Math.min(0, min), max: Math.max(0, max) });
     this.exposure.addEventListener("input", () => this.set({ stops: Number(this.exposure.value) }));
     find("#automatic").addEventListener("click", () => this.set({ stops: this.automatic }));
     find("#unexposed").addEventListener("click", () => this.set({ stops: 0 }));
@@ -191,9 +192,9 @@ class Viewer {
     find("#exposure output").value = stopsText(stops);
     find("#exposure").hidden = !layer.isRadiance && layer.scale !== "records";
     find("#automatic").setAttribute("aria-pressed", stops === this.automatic);
-    find("#unexposed").setAttribute("aria-pressed", stops === 0);
+    find("#unexposed").setAttribute("aria-pressed", stops === 0 && this.automatic !== 0);
     const range = layer.isRadiance ? null : layer.range;
-    find("#legend").replaceChildren(...(range ? [scaleBar(range, layer.format)] : []),
+    find("#legend").replaceChildren(...(range ? [scaleBar(range, layer)] : []),
       ...(layer.isRadiance ? [] : [el("p", {}, range || layer.scale === "records" ? layer.text : "Zero everywhere.")]));
     this.read();
   }
@@ -217,7 +218,7 @@ class Viewer {
       const layer = layerOf();
       view.show(layer, this.gain);
       const range = layer.isRadiance ? null : layer.range;
-      scale.replaceChildren(...(range ? [scaleBar(range, layer.format)] : []));
+      scale.replaceChildren(...(range ? [scaleBar(range, layer)] : []));
       const [title, note] = caption(layer);
       const isEmpty = !layer.isRadiance && layer.scale !== "records" && range === null;
       text.replaceChildren(scale, el("h3", {}, title, value), el("p", {}, isEmpty ? "Zero everywhere." : note));
@@ -252,7 +253,7 @@ class Viewer {
       const heads = el("th", { scope: "row" }, this.pictures.length > 1 ? name : "value");
       return el("tr", { class: of === this.state.of ? "chosen" : null }, heads, values.map((v, c) => el("td", {}, cell(v, c))));
     };
-    find("#pixel").textContent = pixel ? `pixel ${pixel[0]}, ${pixel[1]}` : "no pixel";
+    find("#pixel").textContent = pixel ? `pixel ${pixel[0]}, ${pixel[1]}` : "pixel";
     find("#readout tbody").replaceChildren(...this.pictures.map(row));
     if (at) this.figures.forEach((figure) => figure.read(at));
     const layer = this.layer(this.state.of);
