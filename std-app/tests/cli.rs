@@ -161,7 +161,7 @@ fn a_report_is_a_page_a_curve_and_the_same_object() {
     let page = text("index.html");
     assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
     assert_eq!(folder.page_object("out"), object);
-    for layer in ["picture", "error"] {
+    for layer in ["picture", "variances"] {
         assert!(page.contains(&format!(r#"{{"of":0,"name":"{layer}","width":20,"height":16,"#)), "{layer}");
     }
     assert_eq!((&object["scene"], &object["census"]["emissive"]), (&"scene.obj".into(), &2.into()));

@@ -54,7 +54,7 @@ pub(crate) fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> 
 
 /// Script that runs once the page is ready, with helpers; `note(name, value)` adds a line to the document.
 ///
-/// `pointer(type)` is an event at the centre of the pixel of a picture of `size` × `size`, `colour()` its colour.
+/// `pointer(type)` is an event at a pixel of a picture of `size` × `size`, `colour()` the colour of the pixel.
 pub(crate) fn probe(size: u32, [x, y]: [u32; 2], script: &str) -> String {
     format!(
         "(async () => {{
@@ -67,9 +67,10 @@ pub(crate) fn probe(size: u32, [x, y]: [u32; 2], script: &str) -> String {
             const pointer = (type, of = view) => {{
                 const {{ left, top, width, height }} = of.getBoundingClientRect();
                 return new PointerEvent(type, {{ bubbles: true, pointerId: 1, pointerType: 'mouse',
-                    clientX: left + ({x} + 0.5) / {size} * width, clientY: top + ({y} + 0.5) / {size} * height }});
+                    clientX: left + ({x} + 0.5) / {size} * width,
+                    clientY: top + ({y} + 0.5) / {size} * height }});
             }};
-            const key = (name) => view.dispatchEvent(new KeyboardEvent('keydown', {{ key: name, bubbles: true }}));
+            const key = (key) => view.dispatchEvent(new KeyboardEvent('keydown', {{ key, bubbles: true }}));
             const values = () => all('#readout tbody tr')
                 .map((row) => [...row.cells].map((cell) => cell.textContent).join(' ')).join('|');
             const colour = () => {{

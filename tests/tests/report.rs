@@ -1,5 +1,5 @@
-//! Reports in a real browser: an empty console, names that stay text, values and errors at the pointer, linked
-//! zooms and flips. Skipped with a message without Chromium.
+//! Reports in a real browser: an empty console, names that stay text, values and errors at the pointer, zooms
+//! and flips. Skipped with a message without Chromium.
 
 use crate::browser::{self, Folder, browser, noted, numbers, opened};
 use core::sync::atomic::AtomicBool;
@@ -200,7 +200,8 @@ fn views_zoom_together_about_the_pointer_with_square_pixels() {
             note(`${name}-views`, canvases.length);
             note(`${name}-states`, new Set(canvases.map((canvas) => canvas.style.transform)).size);
             note(`${name}-scale`, Number(canvases[0].style.transform.match(/scale\\((.*)\\)/)[1]));
-            note(`${name}-square`, canvases.every((one) => getComputedStyle(one).imageRendering === 'pixelated'));
+            const isSquare = (canvas) => getComputedStyle(canvas).imageRendering === 'pixelated';
+            note(`${name}-square`, canvases.every(isSquare));
             view.dispatchEvent(pointer('pointermove'));
             note(`${name}-pixel`, document.querySelector('#pixel').textContent);
         };
@@ -228,7 +229,7 @@ fn views_zoom_together_about_the_pointer_with_square_pixels() {
     assert_eq!((number("opened-scale"), number("fit-scale")), (1.0, 1.0));
     assert!((number("wheel-scale") - 0.8f32.exp()).abs() < 1e-3, "{}", number("wheel-scale"));
     assert_eq!(number("one"), 100.0, "one to one");
-    // At a zoom of 2 the view has moved to the right border: four steps of 0.075 pass it, and by one it goes down.
+    // At a zoom of 2 four steps of 0.075 pass the right border; one step goes down.
     let moved = numbers(noted(&document, "moved").trim_start_matches("translate"));
     assert!((moved[0] + 100.0).abs() < 0.1 && (moved[1] + 65.0).abs() < 0.1, "{moved:?}");
 }

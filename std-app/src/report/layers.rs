@@ -4,7 +4,8 @@
 //! four planes, the most significant first, so that equal bytes are neighbours. They are compressed by zlib.
 
 use super::Run;
-use crate::render::{MapView, Mark, Survey};
+use crate::compare::Shown;
+use crate::render::{Mark, PhotonView, Survey, SurveyPixel};
 use crate::save::Image;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -45,134 +46,116 @@ pub(super) struct Layer {
 /// Layers of the render `of`.
 pub(super) fn of_run(run: &Run, of: usize) -> Vec<Layer> {
     let result = run.result;
-    let (image, size) = (&result.image, [result.image.width, result.image.height]);
-    let layer = |name, values: &Values<1>, bits| values.layer(Some(of), name, bits);
-    let plane = |values: Vec<f32>| Values::of(size, values);
-    let mut layers = vec![Values::picture(image).reduced().layer(Some(of), "picture", RADIANCE_BITS)];
+    let image = &result.image;
+    let size = [image.width, image.height];
+    let mut layers = vec![picture("picture", image, RADIANCE_BITS)];
     if result.error.is_some() {
-        let errors = Values::picture(&result.variance).reduced().map(f32::sqrt);
-        layers.push(errors.layer(Some(of), "error", ESTIMATE_BITS));
+        layers.push(picture("variances", &result.variance, ESTIMATE_BITS));
     }
     let [least, most] = [result.samples.iter().min(), result.samples.iter().max()];
     if most > least.map(|least| least + 1).as_ref() {
-        let samples = plane(result.samples.iter().map(|&count| count as f32).collect());
-        layers.push(layer("samples", &samples.reduced(), COUNT_BITS));
+        let samples: Vec<f32> = result.samples.iter().map(|&count| count as f32).collect();
+        layers.push(Layer::new("samples", size, 1, &samples, COUNT_BITS));
     }
     if let (Some(reference), Some(comparison)) = (run.reference(), run.comparison) {
-        let flip = comparison.values(image, reference, crate::compare::Shown::Flip);
-        let flip = plane(flip.pixels.iter().map(|&[value, ..]| value).collect());
-        layers.push(layer("flip", &flip.reduced(), ESTIMATE_BITS));
+        let flip = comparison.values(image, reference, Shown::Flip);
+        let flip: Vec<f32> = flip.pixels.iter().map(|&[value, ..]| value).collect();
+        layers.push(Layer::new("flip", size, 1, &flip, ESTIMATE_BITS));
     }
-    if let Some(survey) = &result.survey {
-        let covers =
-            [survey.width, survey.pixels.len() as u32 / survey.width.max(1)].map(|n| n * survey.step);
-        let maps = survey.pixels.iter().map(|pixel| {
-            let mark = match pixel.mark {
-                Mark::None => 0.0,
-                Mark::Rim => 1.0,
-                Mark::Record => 2.0,
-            };
-            [mark, pixel.radius, pixel.predicted]
-        });
-        let maps: Vec<_> = maps.collect();
-        for (channel, name) in ["records", "radii", "predicted"].into_iter().enumerate() {
-            let values = maps.iter().map(|values| [values[channel]]).collect();
-            let values = Values { size: covers.map(|n| n / survey.step), covers, values };
-            layers.push(layer(name, &values, ESTIMATE_BITS));
-        }
-        layers.push(layer("achieved", &plane(errors(size, survey)).reduced(), ESTIMATE_BITS));
-    }
+    layers.extend(result.survey.iter().flat_map(|survey| of_survey(survey, size)));
     let view = result.photon_view.iter();
-    let maps = view.flat_map(|view| {
-        let global = view.global.iter().map(|map| (["photons", "photon_density", "photon_radius"], map));
+    layers.extend(view.flat_map(|PhotonView { width, global, caustic }| {
+        let global = global.iter().map(|map| (["photons", "photon_density", "photon_radius"], map));
         let names = ["caustic_photons", "caustic_photon_density", "caustic_photon_radius"];
-        global.chain(view.caustic.iter().map(move |map| (names, map))).map(|named| (view.width, named))
-    });
-    for (width, (names, MapView { positions, density, radius, seen })) in maps {
-        for (name, values) in names.into_iter().zip([positions, density, radius]) {
-            let map = Values::of([width, values.len() as u32 / width.max(1)], values.clone());
-            let map = layer(name, &Values { covers: size, ..map }, ESTIMATE_BITS);
-            layers.push(Layer { visible: Some(*seen), ..map });
-        }
-    }
+        let maps = global.chain(caustic.iter().map(move |map| (names, map)));
+        maps.flat_map(move |(names, map)| {
+            let values = names.into_iter().zip([&map.positions, &map.density, &map.radius]);
+            values.map(move |(name, values)| {
+                let height = values.len() as u32 / width.max(&1);
+                let layer = Layer::new(name, [*width, height], 1, values, ESTIMATE_BITS);
+                Layer { covers: size, visible: Some(map.seen), ..layer }
+            })
+        })
+    }));
+    layers.iter_mut().for_each(|layer| layer.of = Some(of));
     layers
 }
 
 /// Layer of a reference.
 pub(super) fn of_reference(reference: &Image) -> Layer {
-    Values::picture(reference).reduced().layer(None, "picture", RADIANCE_BITS)
+    picture("picture", reference, RADIANCE_BITS)
 }
 
-/// Relative errors at the test points of a survey, one square each.
-fn errors([width, height]: [u32; 2], survey: &Survey) -> Vec<f32> {
-    let mut values = vec![0.0; width as usize * height as usize];
+fn picture(name: &'static str, image: &Image, bits: u32) -> Layer {
+    Layer::new(name, [image.width, image.height], 3, image.pixels.as_flattened(), bits)
+}
+
+/// Maps of the pixels of a survey, and the relative errors at its test points, one square each.
+fn of_survey(survey: &Survey, [width, height]: [u32; 2]) -> Vec<Layer> {
+    let size = [survey.width, survey.pixels.len() as u32 / survey.width.max(1)];
+    let covers = size.map(|pixels| pixels * survey.step);
+    let map = |name, of: fn(&SurveyPixel) -> f32| {
+        let values: Vec<f32> = survey.pixels.iter().map(of).collect();
+        Layer { covers, ..Layer::new(name, size, 1, &values, ESTIMATE_BITS) }
+    };
+    let mut errors = vec![0.0; width as usize * height as usize];
     for check in &survey.checks {
         let [x, y] = check.pixel;
         let right = (x + survey.square).min(width);
         for row in y..(y + survey.square).min(height) {
             let row = row as usize * width as usize;
-            values[row + x as usize..row + right as usize].fill(check.error);
+            errors[row + x as usize..row + right as usize].fill(check.error);
         }
     }
-    values
+    vec![
+        map("records", |pixel| match pixel.mark {
+            Mark::None => 0.0,
+            Mark::Rim => 1.0,
+            Mark::Record => 2.0,
+        }),
+        map("radii", |pixel| pixel.radius),
+        map("predicted", |pixel| pixel.predicted),
+        Layer::new("achieved", [width, height], 1, &errors, ESTIMATE_BITS),
+    ]
 }
 
-/// Values of pixels before compression.
-struct Values<const N: usize> {
-    size: [u32; 2],
-    covers: [u32; 2],
-    values: Vec<[f32; N]>,
-}
-
-impl Values<1> {
-    fn of(size: [u32; 2], values: Vec<f32>) -> Self {
-        Self { size, covers: size, values: values.into_iter().map(|value| [value]).collect() }
-    }
-}
-
-impl Values<3> {
-    fn picture(image: &Image) -> Self {
-        let size = [image.width, image.height];
-        Self { size, covers: size, values: image.pixels.clone() }
-    }
-}
-
-impl<const N: usize> Values<N> {
-    /// Values reduced by a whole factor, 1 up to 2^21 pixels; each value is the mean of a square.
-    fn reduced(self) -> Self {
-        let mut factor = 1;
-        while self.values.len() / (factor * factor) as usize > MAX_PIXELS {
-            factor += 1;
-        }
-        if factor == 1 {
-            return self;
-        }
-        let [full, rows] = self.size;
-        let [width, height] = self.size.map(|n| n.div_ceil(factor));
-        let pixel = |index: u32| {
-            let (left, top) = (index % width * factor, index / width * factor);
-            let (right, bottom) = ((left + factor).min(full), (top + factor).min(rows));
-            let square = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
-            let weight = 1.0 / ((right - left) * (bottom - top)) as f32;
-            square.fold([0.0; N], |sum, (x, y)| {
-                let value = self.values[y as usize * full as usize + x as usize];
-                core::array::from_fn(|channel| sum[channel] + value[channel] * weight)
-            })
+impl Layer {
+    /// Layer of a picture of `size`, reduced by a whole factor if it is large.
+    fn new(name: &'static str, size: [u32; 2], channels: usize, values: &[f32], bits: u32) -> Self {
+        let factor = factor(size);
+        let [width, height] = size.map(|pixels| pixels.div_ceil(factor));
+        let covers = [width, height].map(|pixels| pixels * factor);
+        let data = match factor {
+            1 => encoded(values, bits),
+            _ => encoded(&reduced(values, size, channels, factor), bits),
         };
-        let values = (0..width * height).map(pixel).collect();
-        Self { size: [width, height], covers: [width * factor, height * factor], values }
+        Self { of: None, name, width, height, covers, channels, visible: None, data }
     }
+}
 
-    fn map(mut self, function: impl Fn(f32) -> f32) -> Self {
-        self.values.iter_mut().flatten().for_each(|value| *value = function(*value));
-        self
-    }
+/// Least factor by which a picture has at most 2^21 pixels.
+fn factor([width, height]: [u32; 2]) -> u32 {
+    let fits =
+        |factor: &u32| width.div_ceil(*factor) as usize * height.div_ceil(*factor) as usize <= MAX_PIXELS;
+    (1..).find(fits).unwrap_or(u32::MAX)
+}
 
-    fn layer(&self, of: Option<usize>, name: &'static str, bits: u32) -> Layer {
-        let [width, height] = self.size;
-        let data = encoded(self.values.as_flattened(), bits);
-        Layer { of, name, width, height, covers: self.covers, channels: N, visible: None, data }
+/// Means over squares of `factor` × `factor` pixels.
+fn reduced(values: &[f32], [width, height]: [u32; 2], channels: usize, factor: u32) -> Vec<f32> {
+    let mut means = Vec::new();
+    for (top, left) in (0..height)
+        .step_by(factor as usize)
+        .flat_map(|top| (0..width).step_by(factor as usize).map(move |left| (top, left)))
+    {
+        let (right, bottom) = ((left + factor).min(width), (top + factor).min(height));
+        let weight = 1.0 / ((right - left) * (bottom - top)) as f32;
+        means.extend((0..channels).map(|channel| {
+            let square = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
+            let at = |(x, y)| values[(y as usize * width as usize + x as usize) * channels + channel];
+            square.map(at).sum::<f32>() * weight
+        }));
     }
+    means
 }
 
 /// Values with mantissas of `bits` bits, in planes of bytes, by zlib and in base 64.
@@ -226,12 +209,11 @@ mod tests {
 
     #[test]
     fn large_pictures_are_averaged() {
-        let side = 1500;
-        let pixels = (0..side * side).map(|i| [((i % side + i / side) % 2) as f32; 3]).collect();
-        let small = Values::picture(&Image { width: side, height: side, pixels }).reduced();
-        assert_eq!((small.size, small.covers), ([750, 750], [1500, 1500]));
-        assert!(small.values.iter().flatten().all(|&value| value == 0.5));
-        let same = Values::of([3, 1], vec![1.0; 3]).reduced();
-        assert_eq!((same.size, same.covers), ([3, 1], [3, 1]));
+        let pixels: Vec<f32> = (0..1500 * 1500).map(|i| ((i % 1500 + i / 1500) % 2) as f32).collect();
+        assert_eq!((factor([1500, 1500]), factor([1 << 11, 1 << 10]), factor([1 << 20, 3])), (2, 1, 2));
+        let small = reduced(&pixels, [1500, 1500], 1, 2);
+        assert!(small.len() == 750 * 750 && small.iter().all(|&value| value == 0.5));
+        let odd = reduced(&[1.0, 4.0, 2.0, 5.0, 3.0, 6.0], [3, 1], 2, 2);
+        assert_eq!(odd, [1.5, 4.5, 3.0, 6.0]);
     }
 }

@@ -207,15 +207,15 @@ const mapProperties = (key) => {
 // Map of one value for each pixel of `raw`.
 const derived = (key, raw, values) => new Layer({ ...raw, channels: 1, values }, mapProperties(key));
 
-// Maps of the estimated error: `errors` are standard errors of the channels of `picture`.
-const errorMaps = (run, picture, errors, samples) => {
+// Maps of the estimated error, from the `variances` of the channels of `picture`.
+const errorMaps = (run, picture, variances, samples) => {
   const { values, width, height } = picture;
   const whole = mean(run.mean_radiance);
   const floor = 0.01 * whole * whole;
   const [absolute, relative, ofSample] = [0, 1, 2].map(() => new Float32Array(width * height));
   for (let pixel = 0; pixel < width * height; pixel++) {
     for (let i = 3 * pixel; i < 3 * pixel + 3; i++) {
-      const variance = (errors[i] * errors[i]) / 3;
+      const variance = variances[i] / 3;
       absolute[pixel] += variance;
       relative[pixel] += variance / (values[i] * values[i] + floor);
     }
@@ -259,10 +259,9 @@ const differenceMap = (run, picture, reference) => {
 const layersOf = (run, raws, reference) => {
   const raw = Object.fromEntries(raws.map((one) => [one.name, one]));
   const layers = { picture: new Layer(raw.picture, { key: "picture", title: "Picture" }) };
-  if (raw.error) {
-    const { values, width, height } = raw.error;
-    const variance = smoothed(values.map((error) => error * error), width, height, 3);
-    layers.picture.errors = new Layer({ ...raw.error, values: variance.map(Math.sqrt) }, {});
+  if (raw.variances) {
+    const { values, width, height } = raw.variances;
+    layers.picture.errors = new Layer({ ...raw.variances, values: smoothed(values, width, height, 3).map(Math.sqrt) }, {});
     Object.assign(layers, errorMaps(run, raw.picture, values, raw.samples));
   }
   if (run.error.bias?.found) layers.bias = biasMap(run.error.bias, raw.picture);
