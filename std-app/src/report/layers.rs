@@ -5,7 +5,7 @@
 
 use super::Run;
 use crate::compare::Shown;
-use crate::render::{Mark, PhotonView, Survey, SurveyPixel};
+use crate::render::{Mark, Survey, SurveyPixel};
 use crate::save::Image;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -25,6 +25,10 @@ const ESTIMATE_BITS: u32 = 6;
 
 /// Bits of the mantissas of counts: all.
 const COUNT_BITS: u32 = 23;
+
+/// Names of the layers of a photon map: photons of a pixel, their density and their radius.
+const PHOTONS: [&str; 3] = ["photons", "photon_density", "photon_radius"];
+const CAUSTIC_PHOTONS: [&str; 3] = ["caustic_photons", "caustic_photon_density", "caustic_photon_radius"];
 
 /// Values of the pixels of a picture.
 #[derive(Serialize)]
@@ -63,20 +67,17 @@ pub(super) fn of_run(run: &Run, of: usize) -> Vec<Layer> {
         layers.push(Layer::new("flip", size, 1, &flip, ESTIMATE_BITS));
     }
     layers.extend(result.survey.iter().flat_map(|survey| of_survey(survey, size)));
-    let view = result.photon_view.iter();
-    layers.extend(view.flat_map(|PhotonView { width, global, caustic }| {
-        let global = global.iter().map(|map| (["photons", "photon_density", "photon_radius"], map));
-        let names = ["caustic_photons", "caustic_photon_density", "caustic_photon_radius"];
-        let maps = global.chain(caustic.iter().map(move |map| (names, map)));
-        maps.flat_map(move |(names, map)| {
-            let values = names.into_iter().zip([&map.positions, &map.density, &map.radius]);
-            values.map(move |(name, values)| {
-                let height = values.len() as u32 / width.max(&1);
-                let layer = Layer::new(name, [*width, height], 1, values, ESTIMATE_BITS);
+    if let Some(view) = &result.photon_view {
+        let maps = [(PHOTONS, &view.global), (CAUSTIC_PHOTONS, &view.caustic)];
+        for (names, map) in maps.into_iter().filter_map(|(names, map)| Some((names, map.as_ref()?))) {
+            let planes = [&map.positions, &map.density, &map.radius];
+            layers.extend(names.into_iter().zip(planes).map(|(name, values)| {
+                let height = values.len() as u32 / view.width.max(1);
+                let layer = Layer::new(name, [view.width, height], 1, values, ESTIMATE_BITS);
                 Layer { covers: size, visible: Some(map.seen), ..layer }
-            })
-        })
-    }));
+            }));
+        }
+    }
     layers.iter_mut().for_each(|layer| layer.of = Some(of));
     layers
 }
@@ -125,10 +126,7 @@ impl Layer {
         let factor = factor(size);
         let [width, height] = size.map(|pixels| pixels.div_ceil(factor));
         let covers = [width, height].map(|pixels| pixels * factor);
-        let data = match factor {
-            1 => encoded(values, bits),
-            _ => encoded(&reduced(values, size, channels, factor), bits),
-        };
+        let data = encoded(&reduced(values, size, channels, factor), bits);
         Self { of: None, name, width, height, covers, channels, visible: None, data }
     }
 }

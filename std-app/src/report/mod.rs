@@ -98,10 +98,9 @@ impl Race<'_> {
 
     /// Files of the report: `index.html`, `curve.csv`, `run.json`.
     pub fn files(&self) -> Files {
-        let curve = |entry: &'_ RaceEntry<'_>| (Some(entry.name.clone()), entry.run.result.history.clone());
-        let curves: Vec<_> = self.entries.iter().map(curve).collect();
+        let entries = self.entries.iter();
         let curves: Vec<_> =
-            curves.iter().map(|(name, rounds)| (name.as_deref(), rounds.as_slice())).collect();
+            entries.map(|entry| (Some(entry.name.as_str()), &*entry.run.result.history)).collect();
         let layers = self.entries.iter().enumerate().flat_map(|(of, entry)| layers::of_run(&entry.run, of));
         let reference = self.entries.iter().find_map(|entry| entry.run.reference());
         let layers: Vec<_> = layers.chain(reference.map(layers::of_reference)).collect();

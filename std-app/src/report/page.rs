@@ -25,13 +25,11 @@ pub(super) fn page(object: &Value, layers: &[Layer]) -> String {
     let (object, layers) = (embedded(object), embedded(&layers));
     let parts =
         [("{{style}}", STYLE), ("{{object}}", &object), ("{{layers}}", &layers), ("{{script}}", SCRIPT)];
-    let mut page =
-        String::with_capacity(DOCUMENT.len() + parts.map(|(_, part)| part.len()).iter().sum::<usize>());
+    let mut page = String::new();
     let mut rest = DOCUMENT;
     for (mark, part) in parts {
         let (before, after) = rest.split_once(mark).unwrap_or((rest, ""));
-        page.push_str(before);
-        page.push_str(part);
+        page.extend([before, part]);
         rest = after;
     }
     page + rest

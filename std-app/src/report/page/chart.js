@@ -2,6 +2,9 @@
 
 const STYLES = 6;
 
+// Classes of the style sheet for a curve: a colour, and dots for the second use of it.
+const styleOf = (index) => `s${index % STYLES}${index < STYLES ? "" : " again"}`;
+
 // Points closer than this in the logarithm of time merge; with few points each has a mark.
 const MIN_DISTANCE = 0.004;
 const MAX_MARKS = 40;
@@ -82,9 +85,9 @@ const thinned = (points) => {
   return kept;
 };
 
-// Curve of `points` [seconds, error], with a `band` [seconds, lower, upper] and a fitted power law.
-const series = (name, style, points, band = [], fit = null) => ({
-  name, fit, style: `s${style % STYLES}`,
+// Curve number `index` of `points` [seconds, error], with a `band` [seconds, lower, upper] and a fitted power law.
+const series = (name, index, points, band = [], fit = null) => ({
+  name, fit, style: styleOf(index),
   points: points.filter(([seconds, error]) => isPositive(seconds) && isPositive(error)),
   band: band.filter(([seconds]) => isPositive(seconds)),
 });

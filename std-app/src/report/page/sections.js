@@ -45,12 +45,12 @@ const lead = ({ error, ending }) => {
 };
 
 // Curve of the estimates of a render, and of its errors against the reference.
-const estimates = (run, name, style, fit) => series(name, style,
+const estimates = (run, name, index, fit) => series(name, index,
   run.history.map((round) => [round.seconds, round.relmse]),
   run.history.filter((round) => isPositive(round.relmse)).map((round) => [round.seconds, ...round.interval]), fit);
 
-const measurements = (run, name, style, fit) =>
-  series(name, style, run.history.map((round) => [round.seconds, round.reference?.relmse]), [], fit);
+const measurements = (run, name, index, fit) =>
+  series(name, index, run.history.map((round) => [round.seconds, round.reference?.relmse]), [], fit);
 
 const hasReference = (run) => run.error.against === "reference";
 
@@ -286,7 +286,7 @@ const racePage = (race, viewer) => {
     : `Errors are estimated, with 95${THIN}% intervals. The estimate covers sampled noise and the blur of photons, but no other bias.`;
   find("#table").append(raceTable(race));
   const curve = against === "reference" ? measurements : estimates;
-  const style = (name) => (name === null ? "open" : `s${methods.findIndex((method) => method.name === name) % STYLES}`);
+  const style = (name) => (name === null ? "open" : styleOf(methods.findIndex((method) => method.name === name)));
   const named = leads.map((one) => ({ ...one, style: style(one.name), name: one.name ?? "no clear leader" }));
   find("#chart").append(chart(methods.map((method, index) => curve(method, method.name, index)), named) ?? "");
   if (named.length > 0) {
