@@ -54,7 +54,7 @@ pub(crate) fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> 
 
 /// Script that runs once the page is ready, with helpers; `note(name, value)` adds a line to the document.
 ///
-/// `pointer(type)` is an event at a pixel of a picture of `size` × `size`, `colour()` the colour of the pixel.
+/// `pointer(type)` is an event at a pixel of a picture with sides of `size` pixels, `colour()` its colour.
 pub(crate) fn probe(size: u32, [x, y]: [u32; 2], script: &str) -> String {
     format!(
         "(async () => {{

@@ -214,7 +214,15 @@ fn views_zoom_together_about_the_pointer_with_square_pixels() {
         key('1');
         state('one');
         key('0'); key('+'); key('+'); for (let i = 0; i < 4; i++) key('ArrowRight'); key('ArrowDown');
-        note('moved', all('.view canvas')[0].style.transform);";
+        note('moved', all('.view canvas')[0].style.transform);
+        key('0'); key('+'); key('+');
+        const drag = (type, by) => {
+            const { clientX, clientY } = pointer(type);
+            const at = { clientX: clientX + by * view.clientWidth, clientY, pointerId: 1 };
+            view.dispatchEvent(new PointerEvent(type, { bubbles: true, pointerType: 'mouse', ...at }));
+        };
+        drag('pointerdown', 0); drag('pointermove', 0.1); drag('pointermove', 0.25); drag('pointerup', 0.25);
+        note('dragged', all('.view canvas')[0].style.transform);";
     let page = run_page(&loaded, &settings, &result);
     let (console, document) = opened(browser, &folder.0, &page, &probe(zooms));
     assert!(console.is_empty(), "{console:?}");
@@ -232,6 +240,8 @@ fn views_zoom_together_about_the_pointer_with_square_pixels() {
     // At a zoom of 2 four steps of 0.075 pass the right border; one step goes down.
     let moved = numbers(noted(&document, "moved").trim_start_matches("translate"));
     assert!((moved[0] + 100.0).abs() < 0.1 && (moved[1] + 65.0).abs() < 0.1, "{moved:?}");
+    let dragged = numbers(noted(&document, "dragged").trim_start_matches("translate"));
+    assert!((dragged[0] + 25.0).abs() < 0.1 && (dragged[1] + 50.0).abs() < 0.1, "{dragged:?}");
 }
 
 #[test]

@@ -158,12 +158,10 @@ fn reduced(values: &[f32], [width, height]: [u32; 2], channels: usize, factor: u
 
 /// Values with mantissas of `bits` bits, in planes of bytes, by zlib and in base 64.
 fn encoded(values: &[f32], bits: u32) -> String {
-    let words: Vec<u32> = values.iter().map(|&value| rounded(value, bits)).collect();
+    let words = || values.iter().map(|&value| rounded(value, bits));
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
-    let mut bytes = Vec::with_capacity(words.len());
     for shift in [24, 16, 8, 0] {
-        bytes.clear();
-        bytes.extend(words.iter().map(|word| (word >> shift) as u8));
+        let bytes: Vec<u8> = words().map(|word| (word >> shift) as u8).collect();
         // Writing to a vector does not fail.
         let _ = encoder.write_all(&bytes);
     }
