@@ -266,6 +266,8 @@ fn pictures_of_a_race_flip_by_keys() {
         key('m'); note('map', document.querySelector('#map').value);
         note('mapped', all('.chip')[0].textContent);
         key('s'); note('panes', all('#stage canvas').length);
+        note('right', all('.chip')[1].textContent);
+        key('b'); note('swapped', all('.chip').map((chip) => chip.textContent.slice(0, 4)).join());
         key('s'); note('whole', all('#stage canvas').length);";
     let page = race_page_of(&loaded, &settings, [&result, &dark]);
     let (console, document) = opened(browser, &folder.0, &page, &probe(flips));
@@ -277,6 +279,8 @@ fn pictures_of_a_race_flip_by_keys() {
     assert_eq!((note("first-colour"), note("back-colour")), (note("previous-colour"), note("next-colour")));
     assert_eq!([note("chip"), note("map"), note("mapped")], ["path", "standard", "path · Standard error"]);
     assert_eq!([note("panes"), note("whole")], ["2", "1"]);
+    assert!(note("right").starts_with("&lt;script&gt;"), "the second method is on the right");
+    assert_eq!(note("swapped"), "&lt;scr,path");
 }
 
 #[test]

@@ -10,6 +10,10 @@ const MAX_PREDICTION = 1000;
 const MAX_ROWS = 40;
 const MAX_TILES = 12;
 
+// Causes of dropped samples, and their number.
+const CAUSES = { nan: "not a number", infinite: "infinite", negative: "negative", unfinished: "unfinished" };
+const lost = (counts) => Object.keys(CAUSES).reduce((sum, cause) => sum + counts[cause], 0);
+
 const ENDINGS = {
   interrupted: " The render was stopped early.",
   biased: " The render stopped because the bias alone exceeds the requested error: more samples do not help, another method may.",
@@ -165,7 +169,8 @@ const resources = ({ seconds, memory, memory_peak: peak }) => {
 const scene = (run) => {
   const contents = Object.entries(run.census).filter(([, count]) => count > 0);
   const techniques = ["light_paths", "connections", "merging"];
-  const unused = run.left_out.filter(({ what }) => !techniques.includes(what)).map(({ what, why }) => [words(what), why]);
+  const features = run.left_out.filter(({ what }) => !techniques.includes(what));
+  const unused = features.map(({ what, why }) => [words(what), why]);
   find("#scene .columns").append(pairs("Contents", contents.map(([name, count]) => [words(name), grouped(count)])),
     unused.length > 0 ? pairs("Not needed", unused) : "");
   if (run.repairs.length > 0) {
@@ -176,20 +181,19 @@ const scene = (run) => {
 
 // Rejected samples of a render: numbers, causes and tiles.
 const dropped = ({ dropped: { places, tiles, empty_pixels: empty, ...causes }, paths }) => {
-  const names = { nan: "not a number", infinite: "infinite", negative: "negative", unfinished: "unfinished" };
-  const total = Object.keys(names).reduce((sum, cause) => sum + causes[cause], 0);
+  const total = lost(causes);
   if (total === 0) return [el("p", {}, `None of ${grouped(paths)} samples was dropped.`)];
-  const rows = Object.entries(names).map(([cause, name]) => [name, grouped(causes[cause]), percent(causes[cause] / Math.max(1, paths))]);
+  const row = ([cause, name]) => [name, grouped(causes[cause]), percent(causes[cause] / Math.max(1, paths))];
   const tile = (place) => [
     `columns ${place.x} to ${place.x + place.width - 1}, rows ${place.y} to ${place.y + place.height - 1}`,
-    grouped(Object.keys(names).reduce((sum, cause) => sum + place[cause], 0)),
+    grouped(lost(place)),
   ];
   const shown = places.slice(0, MAX_TILES);
   return [
     el("p", {}, `${grouped(total)} of ${grouped(paths)} samples were dropped. Unfinished paths were cut at a technical `
       + "limit, and the picture has their light up to there. Other dropped samples do not count.",
     empty > 0 ? ` ${plural(empty, "pixel")} without any sample left: black.` : ""),
-    table("Dropped samples", ["cause", "samples", "of all"], rows),
+    table("Dropped samples", ["cause", "samples", "of all"], Object.entries(CAUSES).map(row)),
     el("h3", {}, "Tiles with dropped samples",
       shown.length < tiles ? `, the worst ${MAX_TILES} of ${grouped(tiles)}` : ""),
     table("Tiles with dropped samples", ["tile of the picture", "samples"], shown.map(tile)),
@@ -221,7 +225,7 @@ const renderPage = (run, viewer) => {
     ["Error estimation", duration(run.seconds.estimate)],
     ["Rays per second", `${number((run.rays / Math.max(1e-9, run.seconds.render)) * 1e-6, 2)} million`],
     ["Peak memory", byteCount(run.memory_peak)],
-    ["Dropped samples", grouped(["nan", "infinite", "negative", "unfinished"].reduce((sum, cause) => sum + run.dropped[cause], 0))],
+    ["Dropped samples", grouped(lost(run.dropped))],
   ]));
   const curves = [estimates(run, "estimate", 0, run.fit.estimate),
     ...(hasReference(run) ? [measurements(run, "against the reference", 1, run.fit.reference)] : [])];
@@ -237,9 +241,13 @@ const renderPage = (run, viewer) => {
       ["Mean, against the reference", mean === null ? "unknown" : signedPercent(mean / reference - 1)]]));
   }
   const keys = Object.keys(viewer.pictures[0].layers);
-  for (const [section, those] of [["comparison", ["difference", "flip"]],
-    ["maps", ["standard", "relative", "variance", "bias", "samples"]],
-    ["survey", ["records", "radii", "predicted", "achieved"]], ["photons", keys.filter((key) => key.includes("photon"))]]) {
+  const sections = {
+    comparison: ["difference", "flip"],
+    maps: ["standard", "relative", "variance", "bias", "samples"],
+    survey: ["records", "radii", "predicted", "achieved"],
+    photons: keys.filter((key) => key.includes("photon")),
+  };
+  for (const [section, those] of Object.entries(sections)) {
     const figures = viewer.figuresOf(those);
     if (figures.length > 0) show(`#${section}`);
     find(`#${section} .maps`).append(...figures);
@@ -269,8 +277,8 @@ const raceLead = ({ methods, time, leads }) => {
 const raceTable = ({ methods, against }) => {
   const isMeasured = against === "reference";
   const ends = isMeasured ? [] : [`95${THIN}% interval`];
-  const row = (method) => [method.name, grouped(method.spp), duration(method.seconds.render), orDash(method.error.relmse),
-    ...(isMeasured ? [] : [orDash(method.error.interval, range)]), orDash(method.efficiency), orDash(method.ratio),
+  const row = (method) => [method.name, grouped(method.spp), duration(method.seconds.render),
+    orDash(method.error.relmse), ...(isMeasured ? [] : [orDash(method.error.interval, range)]), orDash(method.efficiency), orDash(method.ratio),
     ...(isMeasured ? [] : [orDash(method.ratio_interval, range)])];
   const head = ["method", "samples per pixel", "time", "relMSE", ...ends, "efficiency", "over the first", ...ends];
   return table("Results", head, methods.map(row));
@@ -316,7 +324,8 @@ const main = async () => {
     group.layers.forEach((layer) => { layer.group = group; });
   }
   if (reference) {
-    pictures.push({ name: "reference", layers: { picture: new Layer(reference, { key: "picture", title: "Picture" }) } });
+    const picture = new Layer(reference, { key: "picture", title: "Picture" });
+    pictures.push({ name: "reference", layers: { picture } });
   }
   const viewer = new Viewer(pictures, first.width, first.height);
   const layout = first.width > 1.4 * first.height ? "wide" : "tall";
@@ -332,4 +341,7 @@ const main = async () => {
   document.documentElement.dataset.ready = "true";
 };
 
-main();
+main().catch((error) => {
+  find("#lead").textContent = `This browser cannot show the report (${error.message}). All numbers are in run.json.`;
+  throw error;
+});

@@ -11,7 +11,9 @@ const grouped = (count) => {
 
 const plural = (count, noun) => `${grouped(count)} ${noun}${count === 1 ? "" : "s"}`;
 
-const powerOfTen = (exponent) => "10" + [...String(exponent)].map((c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("");
+const raised = (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)];
+
+const powerOfTen = (exponent) => `10${[...String(exponent)].map(raised).join("")}`;
 
 // Number with so many significant digits, plain from 0.01 to 9999 and otherwise as 2.4 × 10⁻³.
 const number = (value, digits = 3) => {

@@ -42,7 +42,8 @@ class Viewer {
     this.pictures = pictures;
     this.camera = new Camera(width, height);
     this.figures = [];
-    this.state = { of: 0, before: Math.min(1, pictures.length - 1), key: "picture", other: null, boundary: 50, stops: 0 };
+    const before = Math.min(1, pictures.length - 1);
+    this.state = { of: 0, before, key: "picture", other: null, boundary: 50, stops: 0 };
     this.automatic = seenExposure(pictures[0].layers.picture);
     this.stage = new View(this.camera, "Picture", true);
     this.over = this.stage.pane();
@@ -64,6 +65,13 @@ class Viewer {
     return layers[key] ?? layers.picture;
   }
 
+  // Index of the picture and layer on the right of a split: another picture, or another map of the same one.
+  get right() {
+    const { of, other } = this.state;
+    const [kind, id] = (other ?? "of " + of).split(" ");
+    return kind === "of" ? [Number(id), this.layer(Number(id))] : [of, this.layer(of, id)];
+  }
+
   // Keys of the maps of any picture, in their order.
   get maps() {
     return [...new Set(this.pictures.flatMap(({ layers }) => Object.keys(layers)))];
@@ -78,14 +86,17 @@ class Viewer {
     };
     this.radios = pictures.map(radio);
     find("#pictures").append(...this.radios);
-    find("#pictures").hidden = find("#split").hidden = pictures.length < 2;
+    find("#pictures").hidden = pictures.length < 2;
+    find("#split").hidden = pictures.length < 2 && this.maps.length < 2;
     this.select = find("#map");
     this.select.append(...this.maps.map((key) => el("option", { value: key }, MAPS[key]?.[0] ?? "Picture")));
     this.select.addEventListener("change", () => this.set({ key: this.select.value }));
     [this.splits, this.others] = [find("#split input"), find("#split select")];
-    this.others.append(...pictures.map(({ name }, of) => el("option", { value: of }, name)));
-    this.others.value = this.state.before;
-    const split = () => this.set({ other: this.splits.checked ? Number(this.others.value) : null });
+    const others = pictures.length < 2 ? [] : pictures.map(({ name }, of) => [`of ${of}`, name]);
+    others.push(...this.maps.map((key) => [`key ${key}`, MAPS[key]?.[0] ?? "Picture"]));
+    this.others.append(...others.map(([value, name]) => el("option", { value }, name)));
+    this.others.value = pictures.length < 2 ? `key ${this.maps[1]}` : `of ${this.state.before}`;
+    const split = () => this.set({ other: this.splits.checked ? this.others.value : null });
     this.splits.addEventListener("change", split);
     this.others.addEventListener("change", () => {
       this.splits.checked = true;
@@ -134,7 +145,7 @@ class Viewer {
         e: () => this.set({ stops: state.stops + EXPOSURE_STEP }),
         E: () => this.set({ stops: state.stops - EXPOSURE_STEP }),
         a: () => this.set({ stops: this.automatic }),
-        s: () => pictures.length > 1 && this.set({ other: state.other === null ? state.before : null }),
+        s: () => this.set({ other: state.other === null ? this.others.value || null : null }),
       }[event.key];
       const inView = event.target.closest(".view") !== null;
       if (act) act();
@@ -150,6 +161,8 @@ class Viewer {
     const state = { ...before, ...change };
     state.stops = Math.min(Number(max), Math.max(Number(min), state.stops));
     if (state.of !== before.of) state.before = before.of;
+    // A flip to the picture on the right puts the other one there.
+    if (state.other === `of ${state.of}`) state.other = `of ${state.before}`;
     this.state = state;
     this.draw();
     if (state.stops !== before.stops || state.key !== before.key) this.redraw();
@@ -160,7 +173,7 @@ class Viewer {
   }
 
   draw() {
-    const { of, key, other, boundary, stops, before } = this.state;
+    const { of, key, other, boundary, stops } = this.state;
     const layer = this.layer(of);
     this.stage.show(layer, this.gain);
     const isSplit = other !== null;
@@ -168,25 +181,25 @@ class Viewer {
     if (isSplit) {
       this.stage.panes.push(this.over);
       this.stage.panes[0].element.after(this.over.element);
-      this.stage.show(this.layer(other), this.gain, 1);
+      this.stage.show(this.right[1], this.gain, 1);
     } else {
       this.over.element.remove();
     }
     this.stage.box.style.setProperty("--boundary", `${boundary}%`);
     this.divider.hidden = this.labels[1].hidden = find("#boundary").parentElement.hidden = !isSplit;
     const label = (index, shown) => [index, shown].filter((part) => part !== "").join(" · ");
-    const title = (one) => (one.key === "picture" ? "" : one.title);
+    const title = (one) => (one.key === "picture" && this.pictures.length > 1 ? "" : one.title);
     const name = (index) => (this.pictures.length > 1 ? this.pictures[index].name : "");
-    [of, other ?? of].forEach((index, side) => {
-      const text = label(name(index), title(this.layer(index)));
+    [[of, layer], this.right].forEach(([index, one], side) => {
+      const text = label(name(index), title(one));
       this.labels[side].textContent = text;
-      this.labels[side].hidden = text === "" || (side === 1 && !isSplit);
+      this.labels[side].hidden = !isSplit && (side === 1 || text === "Picture");
     });
     this.stage.box.setAttribute("aria-label", label(name(of), layer.title));
     find("input", this.radios[of]).checked = true;
     this.select.value = key;
     this.splits.checked = isSplit;
-    this.others.value = other ?? (Number(this.others.value) === of ? before : this.others.value);
+    this.others.value = other ?? this.others.value;
     this.boundary.value = boundary;
     this.exposure.value = stops;
     find("#exposure output").value = stopsText(stops);
@@ -194,8 +207,9 @@ class Viewer {
     find("#automatic").setAttribute("aria-pressed", stops === this.automatic);
     find("#unexposed").setAttribute("aria-pressed", stops === 0 && this.automatic !== 0);
     const range = layer.isRadiance ? null : layer.range;
-    find("#legend").replaceChildren(...(range ? [scaleBar(range, layer)] : []),
-      ...(layer.isRadiance ? [] : [el("p", {}, range || layer.scale === "records" ? layer.text : "Zero everywhere.")]));
+    const isEmpty = !layer.isRadiance && layer.scale !== "records" && range === null;
+    const text = layer.isRadiance ? [] : [el("p", {}, isEmpty ? "Zero everywhere." : layer.text)];
+    find("#legend").replaceChildren(...(range ? [scaleBar(range, layer)] : []), ...text);
     this.read();
   }
 
@@ -243,15 +257,15 @@ class Viewer {
   // Values of all pictures at the marked pixel, with their errors.
   read() {
     const { pixel, magnification, zoom } = this.camera;
-    const percentage = 100 * magnification;
-    find("#zoom output").value = zoom === 1 ? `fit, ${number(percentage, 2)}${THIN}%` : `${number(percentage, percentage < 1000 ? 3 : 4)}${THIN}%`;
+    find("#zoom output").value = (zoom === 1 ? "fit, " : "") + percent(magnification, magnification < 10 ? 3 : 4);
     const at = pixel && [pixel[0] + 0.5, pixel[1] + 0.5];
     const row = ({ name, layers: { picture } }, of) => {
       const errors = picture.errors && at ? picture.errors.at(...at) : null;
       const values = at ? picture.at(...at) : [null, null, null];
       const cell = (value, c) => [orDash(value), errors && el("small", {}, ` ± ${number(errors[c], 2)}`)];
-      const heads = el("th", { scope: "row" }, this.pictures.length > 1 ? name : "value");
-      return el("tr", { class: of === this.state.of ? "chosen" : null }, heads, values.map((v, c) => el("td", {}, cell(v, c))));
+      const head = el("th", { scope: "row" }, this.pictures.length > 1 ? name : "value");
+      const cells = values.map((value, c) => el("td", {}, cell(value, c)));
+      return el("tr", { class: of === this.state.of ? "chosen" : null }, head, cells);
     };
     find("#pixel").textContent = pixel ? `pixel ${pixel[0]}, ${pixel[1]}` : "pixel";
     find("#readout tbody").replaceChildren(...this.pictures.map(row));

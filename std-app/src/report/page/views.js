@@ -7,6 +7,10 @@ const MAX_MAGNIFICATION = 64;
 const ZOOM_STEP = Math.SQRT2;
 const PAN_STEP = 0.15;
 
+// Logarithm of the zoom for a pixel of the wheel, and the factor for a pinch on a touch pad.
+const WHEEL_SPEED = 0.002;
+const PINCH_SPEED = 4;
+
 // Milliseconds after a scroll of the page in which the wheel still scrolls.
 const SCROLLING = 250;
 
@@ -89,8 +93,8 @@ class View {
     this.takesWheel = takesWheel;
     this.mark = el("div", { class: "mark", hidden: "" });
     this.panes = [this.pane()];
-    this.box = el("div", { class: "view", tabindex: 0, role: "application", "aria-roledescription": "zoomable picture", "aria-label": label },
-      this.panes[0].element, this.mark);
+    const role = { role: "application", "aria-roledescription": "zoomable picture", "aria-label": label };
+    this.box = el("div", { class: "view", tabindex: 0, ...role }, this.panes[0].element, this.mark);
     this.box.style.aspectRatio = `${camera.width} / ${camera.height}`;
     camera.views.push(this);
     new ResizeObserver(() => this.update()).observe(this.box);
@@ -153,8 +157,9 @@ class View {
       const wanted = this.takesWheel || event.ctrlKey || document.activeElement === box;
       if (!wanted || (performance.now() - camera.scrolled < SCROLLING && !event.ctrlKey)) return;
       const lines = event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 400 : 1;
+      const speed = WHEEL_SPEED * (event.ctrlKey ? PINCH_SPEED : 1);
       const before = camera.zoom;
-      camera.zoomTo(camera.zoom * Math.exp(-0.002 * lines * event.deltaY * (event.ctrlKey ? 4 : 1)), this.under(event));
+      camera.zoomTo(camera.zoom * Math.exp(-speed * lines * event.deltaY), this.under(event));
       // At the ends of the zoom the page scrolls.
       if (camera.zoom !== before || event.ctrlKey) event.preventDefault();
     }, { passive: false });
