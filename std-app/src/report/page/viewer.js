@@ -36,6 +36,8 @@ const scaleBar = (range, layer) => {
   return bar;
 };
 
+const NOTHING = "Zero or unknown everywhere.";
+
 class Viewer {
   // Pictures are [{name, layers}]: one for each method, then the reference, if there is one.
   constructor(pictures, width, height) {
@@ -208,7 +210,7 @@ class Viewer {
     find("#unexposed").setAttribute("aria-pressed", stops === 0 && this.automatic !== 0);
     const range = layer.isRadiance ? null : layer.range;
     const isEmpty = !layer.isRadiance && layer.scale !== "records" && range === null;
-    const text = layer.isRadiance ? [] : [el("p", {}, isEmpty ? "Zero everywhere." : layer.text)];
+    const text = layer.isRadiance ? [] : [el("p", {}, isEmpty ? NOTHING : layer.text)];
     find("#legend").replaceChildren(...(range ? [scaleBar(range, layer)] : []), ...text);
     this.read();
   }
@@ -235,7 +237,7 @@ class Viewer {
       scale.replaceChildren(...(range ? [scaleBar(range, layer)] : []));
       const [title, note] = caption(layer);
       const isEmpty = !layer.isRadiance && layer.scale !== "records" && range === null;
-      text.replaceChildren(scale, el("h3", {}, title, value), el("p", {}, isEmpty ? "Zero everywhere." : note));
+      text.replaceChildren(scale, el("h3", {}, title, value), el("p", {}, isEmpty ? NOTHING : note));
       view.box.setAttribute("aria-label", title);
     };
     const read = ([x, y]) => {
