@@ -22,8 +22,7 @@ fn an_audit_says_what_it_knows() {
     // An uncertain bias counts for less (docs/decisions/bias-audit.md).
     let sure = if bias > 0.0 { (bias - detectable * detectable / (4.0 * bias)).max(0.0) } else { 0.0 };
     assert!((error["relmse"].as_f64().unwrap() - noise - sure).abs() < 1e-12, "{bias} {detectable}");
-    let page = std::fs::read_to_string(folder.path("r/index.html")).unwrap();
-    assert!(page.contains("<h2>Audit of the bias</h2>") && page.contains("in step with the picture"));
+    assert_eq!(folder.page_object("r"), audited);
     let text = folder.run("render scene.obj -o c.pfm --size 16x16 --spp 16 --audit 0.2");
     let text = String::from_utf8(text.stdout).unwrap();
     assert!(text.contains("noise and bias") && text.contains("audit  "), "{text}");

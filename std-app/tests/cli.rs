@@ -160,9 +160,11 @@ fn a_report_is_a_page_a_curve_and_the_same_object() {
     assert_eq!(text("curve.csv").lines().count(), 1 + object["history"].as_array().unwrap().len());
     let page = text("index.html");
     assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
-    for words in ["scene.obj", "Error against run time", "Standard error", "emissive", "--report out"] {
-        assert!(page.contains(words), "{words}");
+    assert_eq!(folder.page_object("out"), object);
+    for layer in ["picture", "variances"] {
+        assert!(page.contains(&format!(r#"{{"of":0,"name":"{layer}","width":20,"height":16,"#)), "{layer}");
     }
+    assert_eq!((&object["scene"], &object["census"]["emissive"]), (&"scene.obj".into(), &2.into()));
     assert_eq!(files(&folder.path("out")), 3);
     assert_eq!(object["made"]["command"][1], "render");
 
@@ -193,7 +195,8 @@ fn a_race_tells_who_is_ahead() {
     let csv = std::fs::read_to_string(folder.path("out/curve.csv")).unwrap();
     assert!(csv.starts_with("method,seconds,") && csv.contains("\npath:max-depth=1:seed=4,"), "{csv}");
     let page = std::fs::read_to_string(folder.path("out/index.html")).unwrap();
-    assert!(page.contains("a race of 2 methods") && page.contains("<option>path:max-depth=1:seed=4"));
+    assert_eq!(folder.page_object("out"), object);
+    assert!(page.contains(r#"{"of":1,"name":"picture","width":16"#));
 
     folder.object("render scene.obj -o r.exr --size 16x16 --spp 256 --seed 9 --json");
     let text =

@@ -5,6 +5,7 @@
 
 mod aiming;
 mod bidirectional_reference;
+mod browser;
 mod bsdf;
 mod cache_file;
 mod caustics;

@@ -1,11 +1,13 @@
 //! Objects of `--json` and `run.json`: a contract with scripts (docs/cli.md).
 
-use super::{Provenance, Race, Run};
+use super::fit::{Fit, Point};
+use super::{Provenance, Race, Run, counts};
 use crate::compare::Comparison;
 use crate::render::{
-    Against, Audited, Deviation, Ending, ErrorEstimate, NoiseAndBlur, Region, RejectedTile, RenderResult,
-    Round, Shard, StopRule,
+    Against, Audited, Ending, ErrorEstimate, NoiseAndBlur, Region, RejectedTile, RenderResult, Round, Shard,
+    StopRule,
 };
+use halflight_core::census::Census;
 use halflight_core::film::Dropped;
 use halflight_core::findings::{Decision, Findings, Value as FindingValue};
 use serde_json::{Map, Value, json};
@@ -14,14 +16,20 @@ use std::path::Path;
 /// Object of a render.
 pub(super) fn run(run: &Run) -> Value {
     let (result, settings) = (run.result, run.settings);
-    let plan = halflight_core::census::Census::of(run.scene).plan();
+    let census = Census::of(run.scene);
+    let plan = census.plan();
+    let contents = counts(&census, run.scene).into_iter().map(|(name, count)| (name.into(), count.into()));
     let memory = result.memory.iter().map(|part| (part.structure.into(), part.bytes.into()));
     let shard = settings.shard;
     json!({
+        "scene": run.name,
         "method": result.method.name(),
+        "features": plan.features.name(),
+        "max_depth": settings.max_depth,
         "width": settings.width,
         "height": settings.height,
         "spp": result.spp,
+        "samples": [result.samples.iter().min(), result.samples.iter().max()],
         "rounds": result.rounds,
         "seed": settings.seed,
         "threads": result.threads,
@@ -50,11 +58,14 @@ pub(super) fn run(run: &Run) -> Value {
         "mean_radiance": result.image.mean(),
         "error": error(run),
         "history": result.history.iter().map(round).collect::<Value>(),
+        "fit": fits(&result.history),
         "dropped": dropped_object(&result.counters.dropped, &result.rejected_tiles, result.empty_pixels),
         "filled_pixels": result.filled_pixels,
         "memory": memory.collect::<Map<_, _>>(),
         "memory_peak": result.memory_peak,
         "findings": findings(&result.findings),
+        "census": contents.collect::<Map<_, _>>(),
+        "repairs": run.repairs,
         "left_out": left_out_array(plan.left_out().chain(techniques_left_out(&result.findings))),
         "outputs": run.outputs.iter().map(|file| file_name(file)).collect::<Value>(),
         "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| file_name(&checkpoint.path)),
@@ -171,7 +182,6 @@ fn with_bias(mut object: Value, noise_and_blur: Option<NoiseAndBlur>, audit: Opt
 }
 
 fn bias(audit: &Audited) -> Value {
-    let deviation = |deviation: &Deviation| json!({ "mean": deviation.mean, "error": deviation.error });
     let region = |region: &Region| {
         json!({
             "x": region.x,
@@ -188,7 +198,11 @@ fn bias(audit: &Audited) -> Value {
         "relmse": audit.bias.relmse,
         "interval": [audit.bias.lower, audit.bias.upper],
         "detectable": audit.bias.detectable,
-        "deviation": deviation(&audit.whole),
+        "deviation": {
+            "mean": audit.whole.mean,
+            "error": audit.whole.error,
+            "found": audit.whole_is_biased(),
+        },
         "regions": audit.regions.iter().map(region).collect::<Value>(),
         "audit": {
             "share": audit.work.fraction,
@@ -225,6 +239,20 @@ fn round(round: &Round) -> Value {
             json!({ "relmse": linear.relmse, "mse": linear.mse, "rmse": linear.rmse(), "flip": flip });
     }
     object
+}
+
+/// Power laws of the error against time: of the estimates, and against the reference.
+fn fits(history: &[Round]) -> Value {
+    let fit = |error: fn(&Round) -> Option<f64>| {
+        let points =
+            history.iter().filter_map(|round| Some(Point { seconds: round.seconds, error: error(round)? }));
+        let Fit { level, slope, interval, from } = Fit::through(points)?;
+        Some(json!({ "slope": slope, "interval": interval, "level": level, "from": from }))
+    };
+    json!({
+        "estimate": fit(|round| Some(round.error?.relmse)),
+        "reference": fit(|round| Some(round.reference?.linear.relmse)),
+    })
 }
 
 /// Object of `compare --json`. Errors that are infinite or NaN are `null`, which JSON lacks.

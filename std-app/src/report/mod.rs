@@ -1,11 +1,12 @@
 //! Reports: a page for people, `curve.csv` and `run.json` for programs. The page is one file without
-//! references to others: pictures are data URIs, charts are SVG.
+//! references to others: it holds the object of `run.json` and the values of the pixels.
 
 mod census;
 mod curve;
 mod fit;
 mod folder;
 mod json;
+mod layers;
 mod page;
 mod provenance;
 pub mod quantity;
@@ -23,6 +24,7 @@ use crate::save::Image;
 use halflight_core::census::Census;
 use halflight_core::findings::Decision;
 use halflight_core::scene::Scene;
+use layers::Layer;
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -78,7 +80,9 @@ impl Run<'_> {
 
     /// Files of the report: `index.html`, `curve.csv`, `run.json`.
     pub fn files(&self) -> Files {
-        files(page::run(self), curve::csv(&[(None, &self.result.history)]), &self.object())
+        let mut layers = layers::of_run(self, 0);
+        layers.extend(self.reference().map(layers::of_reference));
+        files(&layers, curve::csv(&[(None, &self.result.history)]), &self.object())
     }
 
     fn reference(&self) -> Option<&Image> {
@@ -94,15 +98,18 @@ impl Race<'_> {
 
     /// Files of the report: `index.html`, `curve.csv`, `run.json`.
     pub fn files(&self) -> Files {
-        let curve = |entry: &'_ RaceEntry<'_>| (Some(entry.name.clone()), entry.run.result.history.clone());
-        let curves: Vec<_> = self.entries.iter().map(curve).collect();
+        let entries = self.entries.iter();
         let curves: Vec<_> =
-            curves.iter().map(|(name, rounds)| (name.as_deref(), rounds.as_slice())).collect();
-        files(page::race(self), curve::csv(&curves), &self.object())
+            entries.map(|entry| (Some(entry.name.as_str()), &*entry.run.result.history)).collect();
+        let layers = self.entries.iter().enumerate().flat_map(|(of, entry)| layers::of_run(&entry.run, of));
+        let reference = self.entries.iter().find_map(|entry| entry.run.reference());
+        let layers: Vec<_> = layers.chain(reference.map(layers::of_reference)).collect();
+        files(&layers, curve::csv(&curves), &self.object())
     }
 }
 
-fn files(page: String, curve: String, object: &Value) -> Files {
+fn files(layers: &[Layer], curve: String, object: &Value) -> Files {
+    let page = page::page(object, layers);
     let object = format!("{object:#}\n");
     vec![
         ("index.html", page.into_bytes()),

@@ -30,11 +30,6 @@ impl Provenance {
             date: date(SystemTime::now()),
         }
     }
-
-    /// Command line for a POSIX shell.
-    pub fn shell(&self) -> String {
-        shell_words::join(&self.command)
-    }
 }
 
 fn processor() -> Option<String> {
@@ -66,12 +61,5 @@ mod tests {
         ] {
             assert_eq!(date(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)), expected);
         }
-    }
-
-    #[test]
-    fn shell_commands_split_into_the_same_words() {
-        let command = ["halflight", "render", "my scene.obj", "it's", "", "--eye=1,-2,3", "$HOME"];
-        let provenance = Provenance { command: command.map(String::from).into(), ..Provenance::here() };
-        assert_eq!(shell_words::split(&provenance.shell()).unwrap(), command);
     }
 }

@@ -46,12 +46,12 @@ pub fn readable_value(value: Value) -> String {
 }
 
 /// Fraction as a percentage with two significant digits.
-pub(super) fn percent(fraction: f64) -> String {
+fn percent(fraction: f64) -> String {
     format!("{}\u{202f}%", number(100.0 * fraction, 2))
 }
 
 /// Count, with thin spaces between thousands from five digits on.
-pub(super) fn grouped(count: u64) -> String {
+fn grouped(count: u64) -> String {
     let digits = count.to_string();
     if digits.len() < 5 {
         return digits;
@@ -67,7 +67,7 @@ pub(super) fn grouped(count: u64) -> String {
 }
 
 /// Number with `digits` significant digits, plain from 0.01 to 9999 and otherwise as 2.4 × 10⁻³.
-pub(super) fn number(value: f64, digits: usize) -> String {
+fn number(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
     }
@@ -84,15 +84,6 @@ pub(super) fn number(value: f64, digits: usize) -> String {
         _ => format!("{mantissa} × 10{}", superscript(exponent)),
     };
     minus(value).to_owned() + &text
-}
-
-/// Power of ten as 10⁻³, or 1 and 10.
-pub(super) fn power_of_ten(exponent: i32) -> String {
-    match exponent {
-        0 => "1".into(),
-        1 => "10".into(),
-        _ => format!("10{}", superscript(exponent)),
-    }
 }
 
 fn minus(value: f64) -> &'static str {
@@ -130,6 +121,5 @@ mod tests {
             [0.0, 0.999, 9.99, -0.0123, 2.4e-3, 1.5e17, 4096.0, 0.0999, f64::INFINITY].map(|x| number(x, 2)),
             ["0", "1.0", "10", "−0.012", "2.4 × 10⁻³", "1.5 × 10¹⁷", "4096", "0.10", "∞"]
         );
-        assert_eq!(power_of_ten(-10), "10⁻¹⁰");
     }
 }

@@ -44,6 +44,13 @@ impl Folder {
         serde_json::from_slice(&output.stdout).unwrap()
     }
 
+    /// The object that the page of a report holds.
+    pub(crate) fn page_object(&self, report: &str) -> Value {
+        let page = std::fs::read_to_string(self.path(report).join("index.html")).unwrap();
+        let rest = page.split_once("id=\"object\">").unwrap().1;
+        serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+    }
+
     /// Runs a command that must be refused with exit code 2, and returns its messages.
     pub(crate) fn refused(&self, arguments: &str) -> String {
         let output = self.run(arguments);
