@@ -7,13 +7,11 @@
 
 mod audit;
 mod built;
-mod cache_file;
 mod deadline;
 mod environment_visibility;
 mod error;
 mod fair_schedule;
-mod film_file;
-mod fingerprint;
+mod files;
 mod gaps;
 mod held_out;
 mod hidden_light;
@@ -24,16 +22,14 @@ mod merge;
 mod method;
 mod picture;
 mod rejected_tiles;
-mod rewritten_file;
 mod run;
-mod sealed;
 mod survey;
 mod threads;
 
 pub(crate) use built::{Built, BuiltMemory};
-pub use cache_file::inspect as inspect_cache;
 pub use error::{FileError, RenderError};
 pub use fair_schedule::{FairSchedule, Turn};
+pub use files::inspect_cache;
 pub use halflight_core::audit::{AuditWork, Audited, NoiseAndBlur, Region};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use halflight_core::method::Shard;

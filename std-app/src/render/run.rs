@@ -3,7 +3,7 @@
 use super::audit::ThreadedAudit;
 use super::built::{Built, BuiltMemory};
 use super::deadline::Deadline;
-use super::film_file::{Identity, Reader};
+use super::files::{self, FilmHeader, FilmReader, Identity};
 use super::hidden_light;
 use super::history::Clock;
 use super::memory::{Bank, Memory};
@@ -11,8 +11,7 @@ use super::method::{self, Attempt, Method, RenderSetup};
 use super::picture::{self, Picture};
 use super::threads::{Pool, Workers};
 use super::{
-    Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file,
-    environment_visibility, gaps,
+    Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, environment_visibility, gaps,
 };
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
@@ -47,7 +46,7 @@ pub(crate) struct Request<'a> {
     method: Method,
     /// Fingerprint of the cache file.
     cache: Option<String>,
-    resumed: Option<Reader>,
+    resumed: Option<FilmReader>,
 }
 
 impl<'a> Request<'a> {
@@ -69,8 +68,8 @@ impl<'a> Request<'a> {
         }
         let bank = Bank::new();
         let most = Memory::new(scene, settings, &bank).for_file();
-        let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
-        let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
+        let cache = files::open_cache(scene, settings, most)?.map(|file| file.header.fingerprint());
+        let resumed = settings.resume.as_deref().map(|file| FilmReader::open(file, most)).transpose()?;
         // A film file holds the method that prepasses chose.
         let of_film = resumed.as_ref().and_then(|film| film.header.method());
         let usual = Method::named(Census::of(scene).plan().method).unwrap_or(Method::Path);
@@ -87,7 +86,7 @@ impl<'a> Request<'a> {
     }
 
     fn identity(&self, method: Method) -> Identity {
-        Identity::of(self.scene, method, &path_settings(self.settings), self.settings, self.cache.clone())
+        FilmHeader::identity(self.scene, method, self.settings, self.cache.as_deref())
     }
 
     /// Renders with the structures of the scene in code for its features.

@@ -10,8 +10,8 @@ pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Me
 pub use photon_view::{MapView, PhotonView};
 
 use super::audit::ThreadedAudit;
+use super::files::RewrittenFile;
 use super::memory::Memory;
-use super::rewritten_file::RewrittenFile;
 use super::run::path_settings;
 use super::survey::Survey;
 use super::threads::{ThreadedRound, Threads, Workers};
@@ -135,20 +135,20 @@ impl Settings {
         }
     }
 
-    /// The part of the settings that determines a picture of `method` and of no other, as text.
+    /// The settings that determine a picture of `method` and of no other, as text.
     pub(super) fn of_method(&self, method: Method) -> String {
         match method {
             Method::Path => String::new(),
-            Method::IrradianceCache => format!(", {:?}", self.cache),
-            Method::RadianceCache => format!(", {:?}, {:?}", self.cache, self.lobes),
-            Method::PhotonMap | Method::ProgressivePhotons => format!(", {:?}", self.photons),
+            Method::IrradianceCache => format!("{:?}", self.cache),
+            Method::RadianceCache => format!("{:?}, {:?}", self.cache, self.lobes),
+            Method::PhotonMap | Method::ProgressivePhotons => format!("{:?}", self.photons),
             Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
-                format!(", {:?}", self.bidirectional)
+                format!("{:?}", self.bidirectional)
             }
             Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
-                format!(", {:?}", self.virtual_lights)
+                format!("{:?}", self.virtual_lights)
             }
-            Method::Metropolis => format!(", {:?}", self.metropolis),
+            Method::Metropolis => format!("{:?}", self.metropolis),
         }
     }
 }

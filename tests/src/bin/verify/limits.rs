@@ -10,8 +10,6 @@ const LONG_FILES: &[(&str, usize)] = &[
     ("simd/src/baseline.rs", 418),
     ("simd/src/kernels/shade/tests.rs", 562),
     ("simd/src/x86/avx2.rs", 474),
-    ("std-app/src/render/cache_file.rs", 435),
-    ("std-app/src/render/picture.rs", 426),
     ("tests/tests/caustics.rs", 476),
 ];
 
