@@ -3,10 +3,9 @@
 use super::error::{FileError, RenderError};
 use super::files::{FilmHeader, FilmReader};
 use super::image::image;
-use super::method::Method;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
 use super::threads::{Pool, Threads, Workers};
-use super::{Audited, ErrorEstimate, NoiseAndBlur};
+use super::{Audited, ErrorEstimate, Method, NoiseAndBlur};
 use crate::memory::{Budget, lines};
 use crate::save::Image;
 use halflight_core::audit::{AuditedPixels, ErrorReport};

@@ -7,11 +7,12 @@ use super::files::{self, FilmHeader, FilmReader, Identity};
 use super::hidden_light;
 use super::history::Clock;
 use super::memory::{Bank, Memory};
-use super::method::{self, Attempt, Method, RenderSetup};
+use super::method::{self, Attempt, RenderSetup};
 use super::picture::{self, Picture};
 use super::threads::{Pool, Workers};
 use super::{
-    Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, environment_visibility, gaps,
+    Ending, MOST_PIXELS, Method, Progress, RenderError, RenderResult, Seconds, Settings,
+    environment_visibility, gaps,
 };
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
@@ -120,7 +121,8 @@ impl WithFeatures for Render<'_> {
         let Request { scene, settings, method, .. } = request;
         let (width, height) = (settings.width, settings.height);
         let bank = Bank::new();
-        let mut memory = Memory::new(scene, settings, &bank).beside(built)?;
+        let mut memory = Memory::new(scene, settings, &bank);
+        built.count_in(&mut memory)?;
         let mut film_lines = memory.take("film", RenderState::footprint(width, height))?;
         // Output images are counted now and allocated at the end.
         let pixels = width as usize * height as usize;

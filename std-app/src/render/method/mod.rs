@@ -5,8 +5,6 @@ mod photon_view;
 #[cfg(test)]
 mod wrong;
 
-pub use halflight_core::cache::radiance::{Basis, LobeSettings};
-pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Method, PhotonSettings};
 pub use photon_view::{MapView, PhotonView};
 
 use super::audit::ThreadedAudit;
@@ -15,7 +13,7 @@ use super::memory::Memory;
 use super::run::path_settings;
 use super::survey::Survey;
 use super::threads::{ThreadedRound, Threads, Workers};
-use super::{RenderError, Settings};
+use super::{Method, RenderError, Settings};
 use crate::save::Patience;
 use cache_keeper::{CacheKeeper, LoadedCaches};
 use halflight_core::audit::{AuditedMethod, Borrower, audit_fraction};
