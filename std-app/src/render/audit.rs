@@ -4,7 +4,7 @@ use super::Method;
 use super::RenderError;
 use super::deadline::End;
 use super::memory::Memory;
-use super::method::RenderSetup;
+use super::setup::RenderSetup;
 use super::threads::{Threads, Workers};
 use halflight_core::audit::{Audit, AuditSettings, audit_fraction};
 use halflight_core::bsdf::Features;

@@ -29,7 +29,7 @@ pub(crate) struct Built<'a> {
     pub(super) bvh: Bvh<'a>,
     pub(super) lights: LightSampler<'a>,
     /// Seconds of building.
-    pub(super) seconds: f64,
+    seconds: f64,
     /// Bytes of the structures, the scene included.
     uses: Vec<MemoryUse>,
     /// Peak of memory while they were built.

@@ -3,7 +3,7 @@
 use super::Method;
 use super::RenderError;
 use super::memory::Memory;
-use super::method::RenderSetup;
+use super::setup::RenderSetup;
 use super::threads::Threads;
 use halflight_core::audit::MethodAtWork;
 use halflight_core::bsdf::Features;

@@ -23,6 +23,7 @@ mod method;
 mod picture;
 mod rejected_tiles;
 mod run;
+mod setup;
 mod survey;
 mod threads;
 

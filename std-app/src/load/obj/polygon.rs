@@ -3,9 +3,10 @@
 //! sums of products, so a scale by a power of two changes none.
 
 use crate::load::notes::Notes;
+use earcut::Earcut;
 
 /// Larger polygons are cut as a fan, with a note: those that cross themselves take quadratic time.
-const MOST_CORNERS: usize = 1 << 14;
+const MOST_CORNERS: usize = 1 << 13;
 
 /// Relative difference of areas up to which triangles cover a polygon: their sum is rounded.
 const ROUNDING: f64 = 1e-9;
@@ -57,14 +58,14 @@ fn polygon(positions: &[[f64; 3]], face: &[u32], triangles: &mut Vec<[u32; 3]>, 
         notes.add(1, format!("polygon of more than {MOST_CORNERS} corners is cut as a fan"));
         return triangles.extend(ring.windows(2).skip(1).map(|pair| [ring[0], pair[0], pair[1]]));
     }
-    // earcut returns triangles that wind clockwise.
-    let cut = earcutr::earcut(points.as_flattened(), &[], 2).unwrap_or_default();
-    let cut: Vec<[usize; 3]> = cut.as_chunks().0.iter().map(|&[a, b, c]| [c, b, a]).collect();
+    let mut cut: Vec<usize> = Vec::new();
+    Earcut::new().earcut(points.iter().copied(), &[], &mut cut);
+    let cut: &[[usize; 3]] = cut.as_chunks().0;
     let (covered, whole) = (cut.iter().map(|corners| area(*corners)), fan_area(&points));
     if (covered.map(f64::abs).sum::<f64>() - whole).abs() > ROUNDING * whole {
         notes.add(1, "polygon that crosses itself is cut as well as it can be");
     }
-    triangles.extend(cut.into_iter().map(|corners| corners.map(|i| ring[i])));
+    triangles.extend(cut.iter().map(|corners| corners.map(|i| ring[i])));
 }
 
 /// Corners without the coordinate in which the area vector (Newell's formula) is largest, counter-clockwise.

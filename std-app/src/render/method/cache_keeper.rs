@@ -1,9 +1,10 @@
 //! Files and surveys of the caches of a picture.
 
-use super::RenderSetup;
+use crate::render::audit::ThreadedAudit;
 use crate::render::files::{self, CacheHeader, Half, Loaded, RewrittenFile, View};
 use crate::render::held_out::EXACT;
 use crate::render::memory::Memory;
+use crate::render::setup::RenderSetup;
 use crate::render::survey::{self, Survey};
 use crate::render::threads::Threads;
 use crate::render::{Method, RenderError};
@@ -77,7 +78,7 @@ impl<'m> CacheKeeper<'m> {
         let RenderSetup { settings, workers, .. } = *setup;
         memory.give_back(LOADED);
         let exact = PathIntegrator::<F>::gather_scratch(EXACT);
-        let reserve = super::ThreadedAudit::<F>::bytes(setup, true);
+        let reserve = ThreadedAudit::<F>::bytes(setup, true);
         let needed = (exact.bytes() * workers.count()).saturating_add(reserve);
         let survey = match settings.survey.filter(|_| memory.has(needed)) {
             Some(points) => Some((points, memory.take_each("survey", exact, workers.count())?)),
