@@ -58,8 +58,8 @@ pub(crate) struct Source<'t> {
 /// A path of modules from the crate root, optionally ending in an item.
 type Path = Vec<String>;
 
-/// A complaint for each import cycle of the crate in folder `root`, and for each import from a higher layer of
-/// the core.
+/// A complaint for each import cycle of the crate in folder `root`, and for each import from a higher layer
+/// of the core.
 pub(crate) fn check(root: &str, sources: &[Source]) -> Vec<String> {
     let tree = Tree::new(sources);
     let mut complaints = Vec::new();
