@@ -16,22 +16,25 @@
 //! if let Some(error) = picture.error {
 //!     println!("relMSE {:.1e}, 95 %: {:.1e} to {:.1e}", error.relmse, error.lower, error.upper);
 //! }
-//! # Ok::<(), Box<dyn core::error::Error + Send + Sync>>(())
+//! # Ok::<(), halflight::Error>(())
 //! ```
 #![forbid(unsafe_code)]
 
 mod cgroup;
 pub mod compare;
+mod error;
 mod file_error;
 pub mod load;
 pub mod memory;
 pub mod pages;
 pub mod picture;
 pub mod pool;
+pub mod quantity;
 pub mod render;
 mod renderer;
 pub mod report;
 pub mod save;
 pub mod values;
 
+pub use error::Error;
 pub use renderer::{Camera, Renderer};

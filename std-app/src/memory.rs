@@ -2,7 +2,7 @@
 //! allocates.
 
 use crate::cgroup;
-use crate::report::quantity::readable_bytes;
+use crate::quantity::readable_bytes;
 use halflight_core::memory::{ALIGNMENT, Footprint, Line, OutOfMemory};
 use std::fs::File;
 use std::io::{self, Read};

@@ -1,6 +1,7 @@
 //! Renderer of a loaded scene: one build for many views.
 
-use crate::load::{self, LoadError, LoadOptions, LoadedScene, SceneViews, View};
+use crate::error::Error;
+use crate::load::{self, LoadOptions, LoadedScene, SceneViews, View};
 use crate::render::{Built, BuiltMemory, Pool, Progress, RenderError, RenderResult, Request, Settings};
 use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
@@ -20,7 +21,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// let stop = Stop { error: Some(1e-3), ..Stop::default() };
 /// let picture = renderer.render(&Settings { stop, ..Settings::default() })?;
 /// halflight::save::write("cornell.png".as_ref(), &picture.image)?;
-/// # Ok::<(), Box<dyn core::error::Error + Send + Sync>>(())
+/// # Ok::<(), halflight::Error>(())
 /// ```
 pub struct Renderer {
     scene: BuiltScene,
@@ -53,17 +54,15 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`load::load`] and [`Renderer::new`].
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, Box<dyn core::error::Error + Send + Sync>> {
-        let load =
-            |path: &Path| -> Result<LoadedScene, LoadError> { load::load(path, &LoadOptions::default()) };
-        Ok(Self::new(load(path.as_ref())?, None)?)
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::new(load::load(path.as_ref(), &LoadOptions::default())?, None)
     }
 
     /// Builds the structures of `loaded` within `memory` bytes; `None`: no limit.
     ///
     /// # Errors
     /// Insufficient memory, or no threads.
-    pub fn new(loaded: LoadedScene, memory: Option<usize>) -> Result<Self, RenderError> {
+    pub fn new(loaded: LoadedScene, memory: Option<usize>) -> Result<Self, Error> {
         let pool = Arc::new(Pool::start(None)?);
         let owner = Owner { loaded, memory: BuiltMemory::default() };
         let scene = BuiltScene::try_new(owner, |owner| {
@@ -95,7 +94,7 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`crate::render::render`].
-    pub fn render(&self, settings: &Settings) -> Result<RenderResult, RenderError> {
+    pub fn render(&self, settings: &Settings) -> Result<RenderResult, Error> {
         let camera = self.scene().camera_or_default();
         self.render_with(camera, settings, &mut |_| {}, &AtomicBool::new(false))
     }
@@ -111,11 +110,11 @@ impl Renderer {
         settings: &Settings,
         progress: &mut dyn FnMut(&Progress),
         interrupt: &AtomicBool,
-    ) -> Result<RenderResult, RenderError> {
+    ) -> Result<RenderResult, Error> {
         let OfScene { views, built } = self.scene.borrow_dependent();
         let scene = views.scene(camera);
         let pool = self.pool(settings.threads)?;
-        Request::open(&scene, settings)?.render(built, &pool, progress, interrupt)
+        Ok(Request::open(&scene, settings)?.render(built, &pool, progress, interrupt)?)
     }
 
     /// The pool of so many threads.

@@ -178,15 +178,15 @@ fn a_film_of_something_else_is_refused_with_the_reason() {
     let resume = "render scene.obj --spp 8 -o b.png --size 20x20 --resume";
     for (more, reason) in [
         ("film --seed 1", "a film of seed 0, not 1"),
-        ("film --max-depth 3", "a film of max-depth no limit of, not 3"),
-        ("film --fov 12", "seen by another camera"),
+        ("film --max-depth 3", "a film of max-depth unlimited, not 3"),
+        ("film --fov 12", "another scene, or its camera changed since"),
         ("missing", "missing: no such file"),
     ] {
         let said = folder.refused(&format!("{resume} {more}"));
         assert!(said.contains(reason), "{more}: {said}");
     }
     let said = folder.refused("render scene.obj --spp 8 -o b.png --size 20x21 --resume film");
-    assert!(said.contains("a film of 20x20 pixels, not 20x21 pixels"), "{said}");
+    assert!(said.contains("a film of size 20x20, not 20x21"), "{said}");
     let whole = fs::read(folder.path("film")).unwrap();
     for (name, bytes, reason) in [
         ("short", whole[..whole.len() - 100].to_vec(), "damaged"),

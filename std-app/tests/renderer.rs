@@ -116,3 +116,25 @@ fn arrays_that_do_not_fit_name_the_mesh_and_the_triangle() {
     let error = parts.mesh("roof", &mesh, white).unwrap_err();
     assert!(error.to_string().contains("2 normals and 3 positions"), "{error}");
 }
+
+#[test]
+fn an_error_names_file_line_and_help_and_becomes_other_errors() {
+    let folder = std::env::temp_dir().join(format!("halflight-error-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("broken.obj");
+    std::fs::write(&file, "v 0 0 0\nv 1 0 zero\n").unwrap();
+    let error = Renderer::open(&file).err().unwrap();
+    assert_eq!((error.file(), error.line()), (Some(&*file), Some(2)));
+    assert!(!error.help().is_empty());
+    let text =
+        format!("{}:2: `zero` in a `v` statement is not a number\n  help: {}", file.display(), error.help());
+    assert_eq!(error.to_string(), text);
+    let boxed = || -> Result<(), Box<dyn core::error::Error + Send + Sync>> { Err(error)? };
+    assert_eq!(boxed().unwrap_err().to_string(), text);
+    std::fs::remove_dir_all(folder).unwrap();
+
+    let renderer = Renderer::new(square().build().unwrap(), None).unwrap();
+    let error = renderer.render(&Settings { memory: Some(1), ..settings(Method::Path, 1) }).unwrap_err();
+    assert!(error.to_string().ends_with(&format!("  help: {}", error.help())), "{error}");
+    assert_eq!((error.file(), error.line()), (None, None));
+}

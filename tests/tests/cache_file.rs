@@ -82,9 +82,7 @@ fn a_cache_of_something_else_is_refused_and_told_why() {
         assert!(why.contains(&file.display().to_string()), "{why}");
         why
     };
-    assert!(
-        refused(&buffers, |s| s.max_depth = Some(4)).ends_with("a cache of max-depth no limit of, not 4")
-    );
+    assert!(refused(&buffers, |s| s.max_depth = Some(4)).ends_with("a cache of max-depth unlimited, not 4"));
     assert!(
         refused(&buffers, |s| s.cache.strata = Some(32)).ends_with("a cache of cache-rays 256, not 1024")
     );

@@ -1,6 +1,7 @@
 //! Settings of path tracing, and counters for reports.
 
 use crate::film::Dropped;
+use bytemuck::{Pod, Zeroable};
 
 /// `max_depth` without a limit.
 pub const UNLIMITED: u32 = u32::MAX;
@@ -27,7 +28,8 @@ impl PathSettings {
 }
 
 /// Counters of work.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Counters {
     /// Number of paths started, one per sample of a pixel.
     pub paths: u64,

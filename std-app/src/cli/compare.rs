@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
 use super::read_picture;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use halflight::compare::{Comparison, Shown, compare, false_colours, working_bytes};
 use halflight::memory::Budget;
 use halflight::report::{comparison_object, file_name};
@@ -29,37 +29,10 @@ pub(super) struct Compare {
     output: Vec<PathBuf>,
     /// Kind of the difference [default: flip for .png, otherwise absolute]
     #[arg(long, requires = "output")]
-    difference: Option<Difference>,
+    difference: Option<Shown>,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Difference {
-    /// A - B; as .png blue is too dark, red is too bright
-    Signed,
-    /// |A - B|
-    Absolute,
-    /// (A - B) / sqrt(B^2 + 0.01 m^2), whose mean square is the relMSE
-    Relative,
-    /// FLIP error of each pixel
-    Flip,
-}
-
-impl Difference {
-    const fn shown(self) -> Shown {
-        match self {
-            Difference::Signed => Shown::Signed,
-            Difference::Absolute => Shown::Absolute,
-            Difference::Relative => Shown::Relative,
-            Difference::Flip => Shown::Flip,
-        }
-    }
-
-    fn name(self) -> String {
-        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
-    }
 }
 
 impl Compare {
@@ -78,8 +51,7 @@ impl Compare {
                 .advice("render both with the same --size; nothing is resampled")
         })?;
         let mut saved = Vec::new();
-        for (file, difference) in plan {
-            let shown = difference.shown();
+        for (file, shown) in plan {
             let values = comparison.values(&a, &b, shown);
             let (picture, scale) = if Format::of(file)?.is_linear() {
                 (values, None)
@@ -88,7 +60,7 @@ impl Compare {
                 (colours, Some([if shown.is_signed() { -end } else { 0.0 }, end]))
             };
             if outputs.save(file, &picture) {
-                saved.push(Saved { file, difference, scale });
+                saved.push(Saved { file, shown, scale });
             }
         }
         let results = if self.json {
@@ -103,16 +75,12 @@ impl Compare {
     }
 
     /// Plans the output `file`, and determines its kind of difference.
-    fn plan<'a>(
-        &self,
-        file: &'a PathBuf,
-        outputs: &mut Outputs,
-    ) -> Result<(&'a PathBuf, Difference), Failure> {
+    fn plan<'a>(&self, file: &'a PathBuf, outputs: &mut Outputs) -> Result<(&'a PathBuf, Shown), Failure> {
         outputs.plan(Role::Picture, file)?;
         let format = Format::of(file)?;
-        let default = if format.is_linear() { Difference::Absolute } else { Difference::Flip };
+        let default = if format.is_linear() { Shown::Absolute } else { Shown::Flip };
         let difference = self.difference.unwrap_or(default);
-        if format == Format::Hdr && difference.shown().is_signed() {
+        if format == Format::Hdr && difference.is_signed() {
             return Err(Failure::new(format!("{}: .hdr holds no values below zero", file.display()))
                 .advice("write a signed difference as .exr, .pfm or .png"));
         }
@@ -123,19 +91,19 @@ impl Compare {
 /// Picture of the difference that was written.
 struct Saved<'a> {
     file: &'a PathBuf,
-    difference: Difference,
+    shown: Shown,
     /// Values of the first and the last false colour.
     scale: Option<[f32; 2]>,
 }
 
 impl Saved<'_> {
     fn object(&self) -> Value {
-        json!({ "file": file_name(self.file), "difference": self.difference.name(), "scale": self.scale })
+        json!({ "file": file_name(self.file), "difference": self.shown.name(), "scale": self.scale })
     }
 
     fn text(&self) -> String {
         let scale = self.scale.map(|[from, to]| format!(", colours from {from:.3e} to {to:.3e}"));
-        let (file, name) = (self.file.display(), self.difference.name());
+        let (file, name) = (self.file.display(), self.shown.name());
         format!("saved  {file}: {name} difference{}", scale.unwrap_or_default())
     }
 }

@@ -6,7 +6,7 @@ use super::stdio::print_result;
 use super::values;
 use clap::Args;
 use halflight::load::{self, LoadOptions, LoadedScene};
-use halflight::report::quantity::{readable_bytes, readable_name};
+use halflight::quantity::{readable_bytes, readable_name};
 use halflight::report::{counts, left_out_array};
 use halflight_core::bvh::Bvh;
 use halflight_core::census::{Census, Plan};

@@ -8,11 +8,11 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use halflight::load::{LoadOptions, LoadedScene};
 use halflight::memory::Budget;
+use halflight::quantity::readable_bytes;
 use halflight::render::{
     BidirectionalSettings, CacheSettings, LobeSettings, Method, MetropolisSettings, PhotonSettings,
     PrimarySpace, RenderError, Settings, Stop, VirtualLightSettings,
 };
-use halflight::report::quantity::readable_bytes;
 use halflight::save::Image;
 use halflight::values::Depth;
 use halflight_core::cache::irradiance::Metric;

@@ -1,8 +1,8 @@
 //! Progress on standard error: a bar on a terminal, otherwise a line every five seconds.
 
 use super::stdio::{escaped, print_message, print_note};
+use halflight::quantity::readable_seconds;
 use halflight::render::Progress;
-use halflight::report::quantity::readable_seconds;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};
 

@@ -1,9 +1,9 @@
 //! Summary of a render as text.
 
 use super::compare as comparing;
+use halflight::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
 use halflight::render::{Audited, BiasEstimate, Ending, ErrorEstimate, NoiseAndBlur, RejectedTile, StopRule};
 use halflight::report::Run;
-use halflight::report::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
 use halflight_core::findings::{Finding, Value};
 use halflight_core::transport::Counters;
 use std::path::Path;

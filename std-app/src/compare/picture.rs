@@ -3,21 +3,27 @@
 use super::heat::{heat, signed};
 use super::{Comparison, Image};
 use crate::save::from_srgb;
+use clap::ValueEnum;
 
 /// Content of a picture of the difference between A and its reference B.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Shown {
-    /// A − B.
+    /// A - B; as .png blue is too dark, red is too bright
     Signed,
-    /// |A − B|.
+    /// |A - B|
     Absolute,
-    /// (A − B) / √(B² + 0.01 m²), m the mean of B: the mean of its square is the relMSE.
+    /// (A - B) / sqrt(B^2 + 0.01 m^2), m the mean of B, whose mean square is the relMSE
     Relative,
-    /// The LDR-FLIP error of each pixel, in [0, 1].
+    /// LDR-FLIP error of each pixel, 0 to 1
     Flip,
 }
 
 impl Shown {
+    /// Its name in flags and results.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
     /// True if values may be negative.
     pub fn is_signed(self) -> bool {
         matches!(self, Shown::Signed | Shown::Relative)

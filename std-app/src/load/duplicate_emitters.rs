@@ -1,7 +1,7 @@
 //! Duplicate emitters. Files with doubled faces are common; each copy would add its light, although only one
 //! is visible.
 
-use super::geometry::Geometry;
+use super::buffers::Geometry;
 use super::notes::Notes;
 use super::overlaps::{ALL, Pair};
 use halflight_core::scene::Material;

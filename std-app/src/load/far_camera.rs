@@ -1,11 +1,9 @@
 //! Cameras with a long lens very far from the scene: relative to the eye, f32 would round the visible
 //! surfaces. Their rays start on a plane before all visible surfaces, where coordinates are small.
 
-use super::scene::{LoadedScene, View};
-use super::transform::direction;
 use core::f64::consts::FRAC_PI_4;
 use glam::{DVec3, Vec3};
-use halflight_core::scene::{Camera, StartPlane};
+use halflight_core::scene::{Camera, Mesh, StartPlane};
 
 /// Tangent of half the field of view of a long lens, at most.
 const LONG: f32 = 1e-3;
@@ -19,13 +17,11 @@ const NEARER: f64 = 64.0;
 /// Distance of the plane from the first visible surface: this part of the way, plus the size of the detail.
 const MARGIN: f64 = 1e-5;
 
-/// Start of the rays of `camera` at `view`; `None`: the eye.
-pub(super) fn start(scene: &LoadedScene, camera: &Camera, view: View) -> Option<StartPlane> {
+/// Start of the rays of `camera`, which is at `eye` and looks `along` a unit vector; `None`: the eye.
+pub(super) fn start(mesh: &Mesh, camera: &Camera, eye: DVec3, along: DVec3) -> Option<StartPlane> {
     if camera.tan_half_fov > LONG {
         return None;
     }
-    let along = direction(view.eye, view.look_at)?;
-    let eye = DVec3::from(scene.transform.point_f64(view.eye));
     let [right, up] = [camera.right, camera.up].map(Vec3::as_dvec3);
     let (slope, lens) = (WIDEST * f64::from(camera.tan_half_fov), f64::from(camera.lens_radius));
     // Half-spaces around the visible volume before the plane in focus.
@@ -35,7 +31,6 @@ pub(super) fn start(scene: &LoadedScene, camera: &Camera, view: View) -> Option<
         let (sin, cos) = (i as f64 * FRAC_PI_4).sin_cos();
         cos * right + sin * up - slope * along
     });
-    let mesh = scene.mesh();
     let depth = |index: u32| {
         let corners = mesh.corners(index).map(|corner| corner.as_dvec3() - eye);
         let is_outside = |side: &DVec3| corners.iter().all(|corner| corner.dot(*side) > lens);

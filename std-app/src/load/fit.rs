@@ -2,7 +2,7 @@
 //! usually the centre of the bounding box. If a few large triangles (a ground, a sun) extend much further
 //! than the detail, the detail determines origin and scale, and large triangles are cut ([`super::split`]).
 
-use super::geometry::{Placed, bounds};
+use super::placed::{Placed, bounds};
 use super::transform::SceneTransform;
 use glam::DVec3;
 

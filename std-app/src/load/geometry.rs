@@ -1,70 +1,15 @@
 //! Assembly of all triangles into one mesh in the coordinates of the core: placed, centred, scaled and
 //! checked. Computed in f64 and rounded last.
 
+use super::buffers::Geometry;
 use super::fit::Fit;
 use super::notes::Notes;
-use super::obj::Group;
+use super::placed::{Placed, is_usable};
 use super::split;
-use super::texcoords::{self, Texcoords};
-use glam::{DMat3, DVec2, DVec3};
+use super::texcoords;
+use glam::{DVec2, DVec3};
 use halflight_core::scene::Triangle;
 use rayon::prelude::*;
-
-/// Larger coordinates count as not finite, because their squares are infinite.
-const LARGEST: f64 = 1e150;
-
-/// Position and orientation of a mesh: `linear * p + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Placement {
-    pub(super) linear: DMat3,
-    pub(super) offset: DVec3,
-}
-
-impl Placement {
-    /// The coordinates of the file.
-    pub(super) const IDENTITY: Self = Self { linear: DMat3::IDENTITY, offset: DVec3::ZERO };
-
-    pub(super) fn point(&self, p: [f64; 3]) -> [f64; 3] {
-        if *self == Self::IDENTITY {
-            return p;
-        }
-        (self.linear * DVec3::from(p) + self.offset).into()
-    }
-
-    /// Transform of normals that keeps their side: the inverse transpose, up to a positive factor.
-    fn normal_matrix(&self) -> DMat3 {
-        let [x, y, z] = [self.linear.x_axis, self.linear.y_axis, self.linear.z_axis];
-        DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * self.linear.determinant().signum()
-    }
-}
-
-/// Triangles of one material with their placement.
-pub(super) struct Placed<'a> {
-    pub(super) group: &'a Group,
-    pub(super) placement: Placement,
-    /// Index into the materials of the scene.
-    pub(super) material: u32,
-    pub(super) texcoords: Texcoords,
-}
-
-/// The buffers of [`halflight_core::scene::Mesh`].
-#[derive(Debug, Default)]
-pub(super) struct Geometry {
-    pub(super) positions: Vec<[f32; 3]>,
-    pub(super) normals: Vec<[f32; 3]>,
-    pub(super) texcoords: Vec<[f32; 2]>,
-    pub(super) triangles: Vec<Triangle>,
-}
-
-/// Bounding box of all finite vertices; infinite and inverted if there are none.
-pub(super) fn bounds(parts: &[Placed]) -> (DVec3, DVec3) {
-    const EMPTY: (DVec3, DVec3) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let of_part = |part: &Placed| {
-        let placed = part.group.positions.iter().map(|&p| part.placement.point(p)).filter(is_usable);
-        placed.map(DVec3::from).fold(EMPTY, |(min, max), p| (min.min(p), max.max(p)))
-    };
-    parts.par_iter().map(of_part).reduce(|| EMPTY, |a, b| (a.0.min(b.0), a.1.max(b.1)))
-}
 
 /// Assembles all parts, in their order. `pieces` is the result of [`pieces`].
 pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Notes) -> Geometry {
@@ -92,10 +37,6 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
         notes.merge(of_part);
     }
     all
-}
-
-fn is_usable(p: &[f64; 3]) -> bool {
-    p.iter().all(|x| x.abs() <= LARGEST)
 }
 
 /// Vertices of a part in the coordinates of the core; NaN if they are not finite.
@@ -265,6 +206,10 @@ fn unit_normal(n: DVec3, notes: &mut Notes) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::load::obj::Group;
+    use crate::load::placed::Placement;
+    use crate::load::texcoords::Texcoords;
+    use glam::DMat3;
 
     fn triangle(positions: [[f64; 3]; 3]) -> Group {
         Group { positions: positions.to_vec(), triangles: vec![[0, 1, 2]], ..Group::default() }

@@ -1,8 +1,8 @@
 //! Upper bounds of the memory that reading a text takes, computed before it is read: the measured worst case
 //! of each statement.
 
-use super::geometry::Placed;
 use super::obj::{Group, Obj};
+use super::placed::Placed;
 use super::text::{Words, words};
 use core::sync::atomic::{AtomicU64, Ordering};
 use halflight_core::sampling::mix;

@@ -5,6 +5,7 @@
 //! [`LoadError`] with file, line and help. `docs/loading.md` has the table of both. The parsers take
 //! arbitrary bytes: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
 
+mod buffers;
 mod duplicate_emitters;
 mod error;
 mod far_camera;
@@ -22,6 +23,7 @@ pub mod obj;
 mod open_glass;
 mod overlaps;
 mod parts;
+mod placed;
 mod relief;
 mod scene;
 pub mod scene_file;
@@ -45,11 +47,11 @@ pub use transform::{SceneTransform, direction};
 
 use crate::memory::{self, Budget, Shortage};
 use files::Lookup;
-use geometry::{Placed, Placement};
 use halflight_core::scene::{Environment, Material};
 use library::{Library, Sources};
 use mtl::MtlMaterial;
 use name::readings;
+use placed::{Placed, Placement};
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;

@@ -1,7 +1,7 @@
 //! Notes on open glass: the inside of a dielectric lies behind its faces, so a single pane fills half of the
 //! space with glass.
 
-use super::geometry::Geometry;
+use super::buffers::Geometry;
 use super::notes::Notes;
 use halflight_core::scene::{Material, Surface};
 use std::collections::{BTreeMap, BTreeSet, HashMap};

@@ -5,7 +5,7 @@
 //! Triangles are sorted by rounded planes. Those of a plane are split by their boxes (Bentley and Wood 1980)
 //! until few are left, which are compared in pairs.
 
-use super::geometry::Geometry;
+use super::buffers::Geometry;
 use super::notes::Notes;
 use glam::{DVec2, DVec3};
 use halflight_core::sampling::mix;

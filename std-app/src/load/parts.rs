@@ -1,7 +1,7 @@
 //! A scene from arrays, with the repairs and notes of the loader.
 
-use super::geometry::Placement;
 use super::obj::{Group, Obj};
+use super::placed::Placement;
 use super::scene_file::EnvironmentChange;
 use super::{
     LoadError, LoadOptions, LoadedScene, PlacedMesh, SceneBuilder, View, memory_estimate, too_large,
@@ -46,7 +46,7 @@ pub struct PartMesh<'a> {
 /// parts.light(PointLight::Point { position: [0.0, 2.0, 0.0].into(), intensity: Rgb::splat(10.0) });
 /// parts.view(View { eye: [0.0, 1.0, 3.0], look_at: [0.0; 3], up: [0.0, 1.0, 0.0] }, 40.0);
 /// let renderer = Renderer::new(parts.build()?, None)?;
-/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// # Ok::<(), halflight::Error>(())
 /// ```
 pub struct SceneParts {
     builder: SceneBuilder,

@@ -119,7 +119,9 @@ impl LoadedScene {
 
     /// `camera` at `view`; if it is very far from the scene, its rays start before all visible surfaces.
     pub fn with_start(&self, camera: Camera, view: View) -> Camera {
-        Camera { start: start(self, &camera, view), ..camera }
+        let eye = DVec3::from(self.transform.point_f64(view.eye));
+        let along = direction(view.eye, view.look_at);
+        Camera { start: along.and_then(|along| start(&self.mesh(), &camera, eye, along)), ..camera }
     }
 
     /// The centre of the scene in the coordinates of the core: of its bounding box or its detail.

@@ -1,7 +1,7 @@
 //! Rounding of texture coordinates to f32. Large ones would lose their fraction, the only part that a
 //! repeating texture needs, so whole periods are subtracted in f64, per triangle.
 
-use super::geometry::Geometry;
+use super::buffers::Geometry;
 use super::map::Map;
 use super::notes::Notes;
 use std::collections::HashMap;

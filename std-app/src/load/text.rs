@@ -12,63 +12,12 @@ const JOINED: u8 = 0x0b;
 
 /// Statements whose operand is a name. It keeps a backslash at its end, which may be the second byte of a
 /// character in Shift-JIS, Big5 or GBK.
-const NAMING: [&str; 15] = [
-    "bump", "call", "csh", "decal", "disp", "g", "maplib", "mtllib", "newmtl", "norm", "o", "refl", "s",
-    "usemap", "usemtl",
-];
+const NAMING: &str = "bump call csh decal disp g maplib mtllib newmtl norm o refl s usemap usemtl";
 
 /// Other statements of OBJ and MTL files: a line that begins with one does not continue the line before.
-const OTHERS: [&str; 49] = [
-    "aniso",
-    "anisor",
-    "bevel",
-    "bmat",
-    "c_interp",
-    "con",
-    "cstype",
-    "ctech",
-    "curv",
-    "curv2",
-    "d",
-    "d_interp",
-    "deg",
-    "end",
-    "f",
-    "fo",
-    "hole",
-    "illum",
-    "ka",
-    "kd",
-    "ke",
-    "ks",
-    "l",
-    "lod",
-    "mg",
-    "ni",
-    "ns",
-    "p",
-    "parm",
-    "pc",
-    "pcr",
-    "pm",
-    "pr",
-    "ps",
-    "scrv",
-    "shadow_obj",
-    "sharpness",
-    "sp",
-    "stech",
-    "step",
-    "surf",
-    "tf",
-    "tr",
-    "trace_obj",
-    "trim",
-    "v",
-    "vn",
-    "vp",
-    "vt",
-];
+const OTHERS: &str = "aniso anisor bevel bmat c_interp con cstype ctech curv curv2 d d_interp deg end f fo hole illum \
+    ka kd ke ks l lod mg ni ns p parm pc pcr pm pr ps scrv shadow_obj sharpness sp stech step surf \
+    tf tr trace_obj trim v vn vp vt";
 
 /// Decodes UTF-8 and UTF-16 with or without a byte-order mark, turns lone carriage returns into line ends and
 /// joins lines that end in a backslash, except comments and names. Ill-formed UTF-8 is kept.
@@ -118,7 +67,7 @@ fn join_continued_lines(bytes: &mut [u8]) {
         let last = last.filter(|_| !word_starts(line).any(|at| line[at] == b'#'));
         let mut is_joined = false;
         if let Some(last) = last {
-            has_name = has_name.or_else(|| words(line).next().map(|word| is_one_of(word, &NAMING)));
+            has_name = has_name.or_else(|| words(line).next().map(|word| is_one_of(word, NAMING)));
             let (names, is_word) = (has_name == Some(true), last == 0 || is_blank(line[last - 1]));
             let next = bytes.get(end + 1..line_end(bytes, end + 1)).unwrap_or_default();
             let is_last = end == bytes.len() || words(next).next().is_some_and(begins_statement);
@@ -143,13 +92,13 @@ fn line_end(bytes: &[u8], start: usize) -> usize {
 }
 
 fn begins_statement(word: &[u8]) -> bool {
-    is_one_of(word, &NAMING) || is_one_of(word, &OTHERS)
+    is_one_of(word, NAMING) || is_one_of(word, OTHERS)
 }
 
 /// True if `word` is one of `keywords`, in any case, or the keyword of a map.
-fn is_one_of(word: &[u8], keywords: &[&str]) -> bool {
+fn is_one_of(word: &[u8], keywords: &str) -> bool {
     word.get(..4).is_some_and(|start| start.eq_ignore_ascii_case(b"map_"))
-        || keywords.iter().any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
+        || keywords.split(' ').any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
 }
 
 /// True if a byte separates words.

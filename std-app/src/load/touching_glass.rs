@@ -2,7 +2,7 @@
 //! towards the other. A ray sees the front that faces it, so each front gets the index of refraction relative
 //! to the other dielectric.
 
-use super::geometry::Geometry;
+use super::buffers::Geometry;
 use super::notes::Notes;
 use super::overlaps::{ALL, Pair};
 use halflight_core::Rgb;

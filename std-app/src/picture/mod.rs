@@ -18,7 +18,7 @@ pub use crate::file_error::FileError;
 pub(crate) use crate::file_error::fail;
 pub use kind::Kind;
 
-use crate::report::quantity::readable_bytes;
+use crate::quantity::readable_bytes;
 use std::path::Path;
 
 /// Most pixels of a picture, 16384².

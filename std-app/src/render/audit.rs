@@ -1,9 +1,10 @@
 //! Audit of the core in the program: memory and threads around it.
 
+use super::Method;
 use super::RenderError;
 use super::deadline::End;
 use super::memory::Memory;
-use super::method::{Method, RenderSetup};
+use super::setup::RenderSetup;
 use super::threads::{Threads, Workers};
 use halflight_core::audit::{Audit, AuditSettings, audit_fraction};
 use halflight_core::bsdf::Features;

@@ -7,7 +7,7 @@ use crate::pages::Pages;
 use halflight_core::Level;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::Scene;
 use self_cell::MutBorrow;
 use std::time::Instant;
@@ -29,11 +29,11 @@ pub(crate) struct Built<'a> {
     pub(super) bvh: Bvh<'a>,
     pub(super) lights: LightSampler<'a>,
     /// Seconds of building.
-    pub(super) seconds: f64,
+    seconds: f64,
     /// Bytes of the structures, the scene included.
-    pub(super) uses: Vec<MemoryUse>,
+    uses: Vec<MemoryUse>,
     /// Peak of memory while they were built.
-    pub(super) peak: usize,
+    peak: usize,
 }
 
 impl<'a> Built<'a> {
@@ -64,6 +64,18 @@ impl<'a> Built<'a> {
         let lights = LightSampler::build(scene, &mut Arena::over(lines))?;
         let seconds = start.elapsed().as_secs_f64();
         Ok(Self { bvh, lights, seconds, uses: memory.uses(), peak: memory.peak() })
+    }
+
+    /// Counts the structures in `memory`, which has the scene already.
+    ///
+    /// # Errors
+    /// Insufficient memory.
+    pub(super) fn count_in(&self, memory: &mut Memory) -> Result<(), RenderError> {
+        for of_built in self.uses.iter().filter(|of_built| of_built.structure != "scene") {
+            memory.set_aside(of_built.structure, Footprint::default().slice::<u8>(of_built.bytes))?;
+        }
+        memory.raise_peak(self.peak);
+        Ok(())
     }
 
     /// Seconds of building.

@@ -2,7 +2,7 @@
 
 use super::RenderError;
 use super::memory::Memory;
-use super::method::RenderSetup;
+use super::setup::RenderSetup;
 use super::threads::Threads;
 use halflight_core::bsdf::Features;
 use halflight_core::findings::Decision::{LeftOut, Used};

@@ -27,6 +27,17 @@ pub enum RenderError {
     File(FileError),
 }
 
+impl RenderError {
+    /// What to do; empty if the problem says it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Memory { .. } => "raise the memory limit, or render fewer pixels",
+            Self::NoCache => "choose one of these methods, or no cache file",
+            _ => "",
+        }
+    }
+}
+
 impl core::fmt::Display for RenderError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {

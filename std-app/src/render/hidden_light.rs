@@ -1,8 +1,9 @@
 //! Light that a method cannot find, measured before the picture, as a part of its error.
 
+use super::Method;
 use super::RenderError;
 use super::memory::Memory;
-use super::method::{Method, RenderSetup};
+use super::setup::RenderSetup;
 use super::threads::Threads;
 use halflight_core::audit::MethodAtWork;
 use halflight_core::bsdf::Features;

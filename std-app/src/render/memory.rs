@@ -1,7 +1,6 @@
 //! Memory of arenas: counted, checked against the limit, and requested from the system without aborting on
 //! failure.
 
-use super::built::Built;
 use super::{RenderError, Settings};
 use crate::compare::working_bytes;
 use crate::memory::{self, Budget};
@@ -57,16 +56,9 @@ impl<'m> Memory<'m> {
         memory
     }
 
-    /// Counts the structures of `built` as taken, but not the scene again.
-    ///
-    /// # Errors
-    /// Insufficient memory.
-    pub(super) fn beside(mut self, built: &Built) -> Result<Self, RenderError> {
-        for of_built in built.uses.iter().filter(|of_built| of_built.structure != "scene") {
-            self.set_aside(of_built.structure, Footprint::default().slice::<u8>(of_built.bytes))?;
-        }
-        self.peak.set(self.peak.get().max(built.peak));
-        Ok(self)
+    /// Raises the peak to at least `bytes`.
+    pub(super) fn raise_peak(&self, bytes: usize) {
+        self.peak.set(self.peak.get().max(bytes));
     }
 
     /// Bytes available for reading a file.
@@ -133,7 +125,7 @@ impl<'m> Memory<'m> {
             Some(other) => other.bytes += bytes,
             None => self.uses.push(MemoryUse { structure, bytes }),
         }
-        self.peak.set(self.peak.get().max(self.total()));
+        self.raise_peak(self.total());
     }
 
     /// Takes `footprint` bytes `count` times: working memory of each thread.

@@ -1,12 +1,11 @@
 //! Merging of the shards of a picture, with the bits of a single render.
 
 use super::error::{FileError, RenderError};
-use super::film_file::{Header, Reader};
+use super::files::{FilmHeader, FilmReader};
 use super::image::image;
-use super::method::Method;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
 use super::threads::{Pool, Threads, Workers};
-use super::{Audited, ErrorEstimate, NoiseAndBlur};
+use super::{Audited, ErrorEstimate, Method, NoiseAndBlur};
 use crate::memory::{Budget, lines};
 use crate::save::Image;
 use halflight_core::audit::{AuditedPixels, ErrorReport};
@@ -46,7 +45,7 @@ pub struct Merged {
 /// Names the first file that does not belong to the first one and why, or missing and repeated shards.
 pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let most = Budget::new(None).limit();
-    let films = files.iter().map(|file| Reader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
+    let films = files.iter().map(|file| FilmReader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
     let (Some(first), Some(name)) = (films.first(), files.first()) else { return Err(RenderError::Shard) };
     films.iter().try_for_each(|film| film.check_sibling(first))?;
     let count = first.header.shard().count;
@@ -72,9 +71,9 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let mut lines = lines(footprint)?;
     let mut arena = Arena::over(&mut lines);
     let mut state = RenderState::new(width, height, Shard::WHOLE, &mut arena)?;
-    state.is_correlated = first.header.shares;
+    state.is_correlated = first.header.is_correlated;
     let mut seconds = 0.0;
-    let headers: Vec<Header> = films.iter().map(|film| film.header.clone()).collect();
+    let headers: Vec<FilmHeader> = films.iter().map(|film| film.header.clone()).collect();
     for film in films {
         seconds += film.header.seconds;
         film.read_into(&mut state)?;

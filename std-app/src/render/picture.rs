@@ -1,17 +1,17 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
 use super::audit::ThreadedAudit;
-use super::film_file::{self, Header, Identity, Reader};
+use super::files::{self, FilmHeader, FilmReader, Identity, RewrittenFile};
 use super::gaps::Sketch;
 use super::history::{Clock, Reference, Round};
 use super::image::{by_rows, image, of_size, without_gaps};
 use super::memory::Memory;
-use super::method::{Method, RenderSetup, Renderer};
+use super::method::Renderer;
 use super::rejected_tiles::{self, empty_pixels};
-use super::rewritten_file::RewrittenFile;
+use super::setup::RenderSetup;
 use super::survey::Survey;
 use super::threads::{RoundLimits, ThreadedRound};
-use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds};
+use super::{Ending, ErrorEstimate, Method, Progress, RenderError, RenderResult, Seconds};
 use crate::save::Patience;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -57,7 +57,7 @@ pub(super) struct Picture<'a, 'm, F> {
     /// Memory that the audit borrows.
     pub(super) memory: &'a mut Memory<'m>,
     pub(super) identity: Identity,
-    pub(super) resumed: Option<Reader>,
+    pub(super) resumed: Option<FilmReader>,
     pub(super) clock: &'a mut Clock,
     pub(super) progress: &'a mut dyn FnMut(&Progress),
     pub(super) interrupt: &'a AtomicBool,
@@ -112,7 +112,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             Some(film) => {
                 let header = film.header.clone();
                 clock.pause(|| film.read_into(state))?;
-                let Header { spp, rounds, seconds, .. } = header;
+                let FilmHeader { spp, rounds, seconds, .. } = header;
                 if let (Some(audit), Some(earlier)) = (audit, header.audit()) {
                     audit.audit.resume(&earlier);
                 }
@@ -263,13 +263,13 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
 
     /// Writes the film file, during the render or at the end with patience `last`.
     fn write_film(&mut self, seconds: f64, last: Option<Patience>) {
-        let Picture { state, audit, identity, clock, .. } = &mut self.picture;
+        let Picture { method, state, audit, identity, clock, .. } = &mut self.picture;
         let (kept, rounds, history) = (&mut self.kept, &self.rounds, &self.history);
         clock.pause(|| {
             let write = |path: &Path, patience: Patience| {
                 let audit = audit.as_ref().map(|audit| audit.audit.state());
-                let header = Header::new(identity.clone(), state, rounds, audit, seconds, history);
-                film_file::write(path, &header, state, patience)
+                let header = FilmHeader::new((identity, *method), state, rounds, audit, seconds, history);
+                files::write_film(path, &header, state, patience)
             };
             match last {
                 Some(patience) => kept.finish(patience, write),

@@ -1,17 +1,16 @@
 //! A render from its settings to its result: checks, structures, method, and the rounds of the picture.
 
-use super::audit::ThreadedAudit;
 use super::built::{Built, BuiltMemory};
 use super::deadline::Deadline;
-use super::film_file::{Identity, Reader};
-use super::hidden_light;
+use super::files::{self, FilmHeader, FilmReader, Identity};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
-use super::method::{self, Attempt, Method, RenderSetup};
+use super::method::{self, Attempt, Ready};
 use super::picture::{self, Picture};
+use super::setup::RenderSetup;
 use super::threads::{Pool, Workers};
 use super::{
-    Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file,
+    Ending, MOST_PIXELS, Method, Progress, RenderError, RenderResult, Seconds, Settings,
     environment_visibility, gaps,
 };
 use core::sync::atomic::AtomicBool;
@@ -20,10 +19,9 @@ use halflight_core::census::{Census, WithFeatures};
 use halflight_core::film::Tile;
 use halflight_core::findings::Decision::LeftOut;
 use halflight_core::findings::{Finding, Findings};
-use halflight_core::memory::{Arena, Footprint, MemorySource};
+use halflight_core::memory::{Arena, Footprint, Line, MemorySource};
 use halflight_core::method::{MethodPlan, RenderState, Shard};
 use halflight_core::scene::Scene;
-use halflight_core::transport::{PathSettings, UNLIMITED};
 
 /// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. The calling thread calls
 /// `progress` after each round, outside the measured time. [`crate::Renderer`] renders several views of a
@@ -47,7 +45,7 @@ pub(crate) struct Request<'a> {
     method: Method,
     /// Fingerprint of the cache file.
     cache: Option<String>,
-    resumed: Option<Reader>,
+    resumed: Option<FilmReader>,
 }
 
 impl<'a> Request<'a> {
@@ -69,8 +67,8 @@ impl<'a> Request<'a> {
         }
         let bank = Bank::new();
         let most = Memory::new(scene, settings, &bank).for_file();
-        let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
-        let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
+        let cache = files::open_cache(scene, settings, most)?.map(|file| file.header.fingerprint());
+        let resumed = settings.resume.as_deref().map(|file| FilmReader::open(file, most)).transpose()?;
         // A film file holds the method that prepasses chose.
         let of_film = resumed.as_ref().and_then(|film| film.header.method());
         let usual = Method::named(Census::of(scene).plan().method).unwrap_or(Method::Path);
@@ -87,7 +85,26 @@ impl<'a> Request<'a> {
     }
 
     fn identity(&self, method: Method) -> Identity {
-        Identity::of(self.scene, method, &path_settings(self.settings), self.settings, self.cache.clone())
+        FilmHeader::identity(self.scene, method, self.settings, self.cache.as_deref())
+    }
+
+    /// Memory with the structures `built`, the film, whose bytes come second, and the pictures of the result,
+    /// which are counted now and allocated at the end.
+    fn memory<'m>(&self, built: &Built, bank: &'m Bank) -> Result<(Memory<'m>, Vec<Line>), RenderError> {
+        let Settings { width, height, .. } = *self.settings;
+        let mut memory = Memory::new(self.scene, self.settings, bank);
+        built.count_in(&mut memory)?;
+        let film = memory.take("film", RenderState::footprint(width, height))?;
+        let pixels = width as usize * height as usize;
+        let pictures = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
+        memory.set_aside("picture", pictures.slice::<u32>(pixels))?;
+        Ok((memory, film))
+    }
+
+    /// An empty film in the bytes of `lines`.
+    fn state<'m>(&self, lines: &'m mut [Line]) -> Result<RenderState<'m>, RenderError> {
+        let Settings { width, height, shard, .. } = *self.settings;
+        Ok(RenderState::new(width, height, shard, &mut Arena::over(lines))?)
     }
 
     /// Renders with the structures of the scene in code for its features.
@@ -119,63 +136,48 @@ impl WithFeatures for Render<'_> {
         let Render { mut request, built, pool, progress, interrupt } = self;
         let mut resumed = request.resumed.take();
         let Request { scene, settings, method, .. } = request;
-        let (width, height) = (settings.width, settings.height);
         let bank = Bank::new();
-        let mut memory = Memory::new(scene, settings, &bank).beside(built)?;
-        let mut film_lines = memory.take("film", RenderState::footprint(width, height))?;
-        // Output images are counted now and allocated at the end.
-        let pixels = width as usize * height as usize;
-        let picture = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
-        memory.set_aside("picture", picture.slice::<u32>(pixels))?;
-        let Built { bvh, lights, seconds: build, .. } = *built;
-        let lights = lights.with_level(settings.level);
-
+        let (mut memory, mut film) = request.memory(built, &bank)?;
+        let pixels = settings.width as usize * settings.height as usize;
         let mut clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
         let left =
             settings.stop.seconds.map(|limit| limit - clock.seconds() - picture::ending_seconds(pixels));
         let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(left));
-        let plain = RenderSetup { scene, bvh, lights, settings, workers: &workers };
+        let lights = built.lights.with_level(settings.level);
+        let plain = RenderSetup { scene, bvh: built.bvh, lights, settings, workers: &workers };
         let affords_pilots = method != Method::Path || plain.goal().affords_pilots(pixels);
         let hurried = (!affords_pilots).then(|| without_pilots(settings));
         let settings = hurried.as_ref().unwrap_or(settings);
-        let plain = RenderSetup { settings, ..plain };
-        let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
-        let setup = RenderSetup { scene, bvh, lights, settings, workers: &workers };
-        let plain = setup.paths::<F>(settings.seed);
-        let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
+        let (lights, visibility) =
+            environment_visibility::learn::<F>(&RenderSetup { settings, ..plain }, &mut memory)?;
+        let pilots = (!affords_pilots).then(|| Finding::new("pilots", LeftOut, "there is too little time"));
+        let setup = RenderSetup { lights, settings, ..plain };
+        let tracer = setup.paths::<F>(settings.seed);
+        let sketch = |workers: &Workers| gaps::sketch(&tracer, [settings.width, settings.height], workers);
         let is_open = settings.method.is_none() && resumed.is_none();
         let mut plan = if is_open { MethodPlan::open() } else { MethodPlan::from(method) };
         let mut may_fall_back = is_open;
         loop {
             let mut own = memory.within();
-            let ready = match method::set_up::<F>(plan, &setup, &mut own) {
+            let Ready { mut renderer, audit, hidden } = match method::set_up::<F>(plan, &setup, &mut own) {
+                Ok(Attempt::Ready(ready)) => *ready,
                 Ok(Attempt::Instead(better)) => {
                     plan = *better;
                     continue;
                 }
-                Ok(Attempt::Ready(renderer)) => {
-                    let (method, findings) = (renderer.chosen(), renderer.findings());
-                    ThreadedAudit::<F>::new(&setup, &mut own, method).and_then(|audit| {
-                        let hidden = hidden_light::measure::<F>(&setup, &mut own, method, &findings)?;
-                        Ok((renderer, audit, hidden))
-                    })
-                }
-                Err(error) => Err(error),
-            };
-            let (mut renderer, audit, hidden) = match ready {
                 // A method that was chosen may need more memory than path tracing.
                 Err(RenderError::Memory { .. }) if may_fall_back => {
                     may_fall_back = false;
                     plan = Method::Path.into();
                     continue;
                 }
-                ready => ready?,
+                Err(error) => return Err(error),
             };
             let method = renderer.chosen();
             let picture = Picture {
                 method,
                 setup,
-                state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
+                state: request.state(&mut film)?,
                 audit,
                 hidden,
                 memory: &mut own,
@@ -192,9 +194,7 @@ impl WithFeatures for Render<'_> {
                 plan = MethodPlan::instead_of(done.method, &done.findings);
                 continue;
             }
-            let seconds = Seconds { build, ..done.seconds };
-            let pilots =
-                (!affords_pilots).then(|| Finding::new("pilots", LeftOut, "there is too little time"));
+            let seconds = Seconds { build: built.seconds(), ..done.seconds };
             let findings = Findings::default().and(pilots).and(visibility).and(done.findings);
             let (memory, memory_peak) = (own.uses(), own.peak());
             return Ok(RenderResult { memory, memory_peak, seconds, findings, ..done });
@@ -216,10 +216,4 @@ fn without_pilots(settings: &Settings) -> Settings {
     let reuse = settings.reuse.or(Some(false));
     let environment_visibility = settings.environment_visibility.or(Some(false));
     Settings { caustics: false, reuse, environment_visibility, ..settings.clone() }
-}
-
-/// Path settings common to all methods.
-pub(super) fn path_settings(settings: &Settings) -> PathSettings {
-    let Settings { width, height, seed, max_depth, .. } = *settings;
-    PathSettings { width, height, seed, max_depth: max_depth.unwrap_or(UNLIMITED) }
 }

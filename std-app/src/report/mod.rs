@@ -9,7 +9,6 @@ mod json;
 mod layers;
 mod page;
 mod provenance;
-pub mod quantity;
 mod race;
 
 pub use census::counts;

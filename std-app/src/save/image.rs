@@ -1,6 +1,5 @@
-//! A picture in memory: linear RGB.
+//! A picture in memory: linear RGB, and the curve of sRGB.
 
-use super::from_srgb;
 use crate::picture::{Picture, Samples};
 use halflight_core::Rgb;
 
@@ -56,5 +55,35 @@ impl From<Picture> for Image {
             }
         };
         Self { width: picture.width, height: picture.height, pixels }
+    }
+}
+
+/// Linear value to display value in [0, 1] (IEC 61966-2-1); 0 for NaN.
+pub fn to_srgb(linear: f32) -> f32 {
+    // `clamp` keeps NaN, `max` drops it.
+    let linear = linear.clamp(0.0, 1.0).max(0.0);
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Display value to linear value, the inverse of [`to_srgb`].
+pub fn from_srgb(display: f32) -> f32 {
+    if display <= 0.040_45 { display / 12.92 } else { ((display + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_curve_has_published_values_and_inverts() {
+        for (linear, display) in
+            [(0.0, 0), (0.5, 188), (0.18, 118), (1.0, 255), (7.0, 255), (-1.0, 0), (f32::NAN, 0)]
+        {
+            assert_eq!((to_srgb(linear) * 255.0 + 0.5) as u8, display, "{linear}");
+        }
+        for byte in 0..=255u8 {
+            let display = f32::from(byte) / 255.0;
+            assert!((to_srgb(from_srgb(display)) - display).abs() < 1e-6);
+        }
     }
 }

@@ -1,14 +1,15 @@
-//! Triangulation of polygons by ear clipping (Meisters 1975), in the coordinate plane in which the polygon
-//! has the largest area. Exact for simple polygons, concave ones included. All decisions are signs of sums of
-//! products, so a scale by a power of two changes none.
+//! Triangulation of polygons by ear clipping (Meisters 1975; earcut), in the coordinate plane in which the
+//! polygon has the largest area. Exact for simple polygons, concave ones included. All decisions are signs of
+//! sums of products, so a scale by a power of two changes none.
 
 use crate::load::notes::Notes;
+use earcut::Earcut;
 
-/// Larger polygons are cut as a fan, with a note: ear clipping takes quadratic time.
-const MOST_CORNERS: usize = 4096;
+/// Larger polygons are cut as a fan, with a note: those that cross themselves take quadratic time.
+const MOST_CORNERS: usize = 1 << 13;
 
-/// Cuts without an ear before the rest of a polygon that crosses itself is cut as a fan.
-const MOST_GUESSES: usize = 16;
+/// Relative difference of areas up to which triangles cover a polygon: their sum is rounded.
+const ROUNDING: f64 = 1e-9;
 
 /// Triangles of consecutive faces. `arities`: number of corners of each face; empty if all are triangles.
 pub(super) fn triangulate(
@@ -48,17 +49,23 @@ fn polygon(positions: &[[f64; 3]], face: &[u32], triangles: &mut Vec<[u32; 3]>, 
         return notes.add(1, "polygon without area left out");
     }
     let points = flatten(&ring.iter().map(|&v| point(v)).collect::<Vec<_>>());
+    let area = |[a, b, c]: [usize; 3]| signed_area(points[a], points[b], points[c]);
+    // Most polygons are quads that this diagonal divides.
+    if ring.len() == 4 && [[3, 0, 1], [1, 2, 3]].into_iter().all(|half| area(half) > 0.0) {
+        return triangles.extend([[3, 0, 1], [1, 2, 3]].map(|half| half.map(|i| ring[i])));
+    }
     if ring.len() > MOST_CORNERS {
         notes.add(1, format!("polygon of more than {MOST_CORNERS} corners is cut as a fan"));
-        return fan(&ring, triangles);
+        return triangles.extend(ring.windows(2).skip(1).map(|pair| [ring[0], pair[0], pair[1]]));
     }
-    if !clip_ears(&ring, &points, triangles) {
+    let mut cut: Vec<usize> = Vec::new();
+    Earcut::new().earcut(points.iter().copied(), &[], &mut cut);
+    let cut: &[[usize; 3]] = cut.as_chunks().0;
+    let (covered, whole) = (cut.iter().map(|corners| area(*corners)), fan_area(&points));
+    if (covered.map(f64::abs).sum::<f64>() - whole).abs() > ROUNDING * whole {
         notes.add(1, "polygon that crosses itself is cut as well as it can be");
     }
-}
-
-fn fan(ring: &[u32], triangles: &mut Vec<[u32; 3]>) {
-    triangles.extend(ring.windows(2).skip(1).map(|pair| [ring[0], pair[0], pair[1]]));
+    triangles.extend(cut.iter().map(|corners| corners.map(|i| ring[i])));
 }
 
 /// Corners without the coordinate in which the area vector (Newell's formula) is largest, counter-clockwise.
@@ -87,52 +94,9 @@ fn signed_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Cuts ears off until a triangle is left. `false` if the polygon is not simple and a corner without an ear
-/// was cut.
-fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -> bool {
-    let mut left: Vec<usize> = (0..ring.len()).collect();
-    let mut guesses = 0;
-    let mut at = 0; // the corner to try next
-    let mut tried = 0;
-    while left.len() > 3 {
-        let count = left.len();
-        let (a, b, c) = (left[(at + count - 1) % count], left[at % count], left[(at + 1) % count]);
-        let flat = signed_area(points[a], points[b], points[c]) == 0.0;
-        let guess = tried >= count;
-        if guess || is_ear(points, &left, [a, b, c]) {
-            guesses += usize::from(guess);
-            if guesses > MOST_GUESSES {
-                fan(&left.iter().map(|&i| ring[i]).collect::<Vec<_>>(), triangles);
-                return false;
-            }
-            if !flat || guess {
-                triangles.push([ring[a], ring[b], ring[c]]);
-            }
-            left.remove(at % count);
-            at = (at + count - 1) % count % (count - 1);
-            tried = 0;
-        } else {
-            at = (at + 1) % count;
-            tried += 1;
-        }
-    }
-    if let [a, b, c] = left[..] {
-        triangles.push([ring[a], ring[b], ring[c]]);
-    }
-    guesses == 0
-}
-
-/// True if corner `b` is convex and the triangle with its neighbours contains no other corner.
-fn is_ear(points: &[[f64; 2]], left: &[usize], [a, b, c]: [usize; 3]) -> bool {
-    let (pa, pb, pc) = (points[a], points[b], points[c]);
-    if signed_area(pa, pb, pc) <= 0.0 {
-        return false;
-    }
-    let inside = |p: [f64; 2]| {
-        signed_area(pa, pb, p) >= 0.0 && signed_area(pb, pc, p) >= 0.0 && signed_area(pc, pa, p) >= 0.0
-    };
-    let corner = |p: [f64; 2]| p == pa || p == pb || p == pc;
-    !left.iter().any(|&i| i != a && i != b && i != c && !corner(points[i]) && inside(points[i]))
+/// Twice the signed area of a polygon.
+fn fan_area(points: &[[f64; 2]]) -> f64 {
+    points.windows(2).skip(1).map(|pair| signed_area(points[0], pair[0], pair[1])).sum()
 }
 
 #[cfg(test)]
@@ -209,5 +173,27 @@ mod tests {
         assert!(triangulate(&bad, &[0, 1, 2, 3], &[4], &mut notes).is_empty());
         let bow = [[0., 0., 0.], [1., 1., 0.], [1., 0., 0.], [0., 1., 0.]];
         triangulate(&bow, &[0, 1, 2, 3], &[4], &mut notes);
+    }
+
+    #[test]
+    fn polygons_with_many_corners_are_exact_or_noted() {
+        let count = MOST_CORNERS;
+        let circle = |i: usize, radius: f64| {
+            let angle = i as f64 / count as f64 * core::f64::consts::TAU;
+            [radius * angle.cos(), radius * angle.sin(), 1.0]
+        };
+        let gear: Vec<_> = (0..count).map(|i| circle(i, 1.0 + (i / 4 % 2) as f64)).collect();
+        let (triangles, area, notes) = cut(&gear);
+        let exact = fan_area(&flatten(&gear)) / 2.0;
+        assert!((area - exact).abs() < ROUNDING * exact && notes.is_empty(), "{area} of {exact}");
+        assert!(triangles.len() <= count - 2);
+        // Every edge crosses nearly all others.
+        let star: Vec<_> = (0..count - 1).map(|i| circle(i * (count / 2 - 1) % (count - 1), 1.0)).collect();
+        let mut notes = Notes::default();
+        let corners: Vec<u32> = (0..count as u32 - 1).collect();
+        triangulate(&star, &corners, &[count as u32 - 1], &mut notes);
+        assert_eq!(notes.sentences(), ["polygon that crosses itself is cut as well as it can be"]);
+        let wild: Vec<_> = (0..count).map(|i| circle(i * i * 7919 % count, (i % 97) as f64)).collect();
+        triangulate(&wild, &(0..count as u32).collect::<Vec<_>>(), &[count as u32], &mut notes);
     }
 }

@@ -15,9 +15,9 @@ pub use values::{Colour, Factors, Matrix, Reflectance, Rotation};
 
 use super::error::LoadError;
 use super::files::{Found, Lookup};
-use super::geometry::Placement;
 use super::map::Map;
 use super::notes::Notes;
+use super::placed::Placement;
 use super::scene::{LoadedScene, RenderSettings, View};
 use super::{LoadOptions, SceneBuilder, memory_estimate, read, too_large};
 use crate::values::{FieldOfView, NotNegative, Number, Positive};

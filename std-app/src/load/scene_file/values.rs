@@ -1,6 +1,6 @@
 //! Values of a scene file, checked during parsing, so that errors have their line and column.
 
-use crate::load::geometry::Placement;
+use crate::load::placed::Placement;
 use crate::load::transform::direction;
 use crate::values::{Factor, Number};
 use glam::{DMat3, DVec3};

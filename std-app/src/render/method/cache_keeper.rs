@@ -1,10 +1,10 @@
 //! Files and surveys of the caches of a picture.
 
-use super::RenderSetup;
-use crate::render::cache_file::{self, Half, Header, Loaded, View};
+use crate::render::audit::ThreadedAudit;
+use crate::render::files::{self, CacheHeader, Half, Loaded, RewrittenFile, View};
 use crate::render::held_out::EXACT;
 use crate::render::memory::Memory;
-use crate::render::rewritten_file::RewrittenFile;
+use crate::render::setup::RenderSetup;
 use crate::render::survey::{self, Survey};
 use crate::render::threads::Threads;
 use crate::render::{Method, RenderError};
@@ -20,7 +20,7 @@ const LOADED: &str = "loaded records";
 /// Records of a file, for caches to begin with.
 pub(super) struct LoadedCaches {
     halves: [Loaded; 2],
-    header: Header,
+    header: CacheHeader,
     view: View,
 }
 
@@ -34,12 +34,13 @@ impl LoadedCaches {
         let RenderSetup { scene, settings, .. } = *setup;
         let view = View::of(scene, settings);
         if !method.has_records() {
-            return Ok(Self { halves: Default::default(), header: Header::new(scene, settings), view });
+            return Ok(Self { halves: Default::default(), header: CacheHeader::new(scene, settings), view });
         }
-        let file = cache_file::open(scene, settings, memory.for_file())?;
-        let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
+        let file = files::open_cache(scene, settings, memory.for_file())?;
+        let header =
+            file.as_ref().map_or_else(|| CacheHeader::new(scene, settings), |file| file.header.clone());
         memory.set_aside(LOADED, Footprint::default().slice::<u8>(header.bytes() as usize))?;
-        let halves = file.map(cache_file::Reader::load).transpose()?.unwrap_or_default();
+        let halves = file.map(|file| file.load()).transpose()?.unwrap_or_default();
         Ok(Self { halves, header, view })
     }
 
@@ -57,7 +58,7 @@ impl LoadedCaches {
 
 /// Keeper of the caches of a picture.
 pub(super) struct CacheKeeper<'m> {
-    header: Header,
+    header: CacheHeader,
     view: View,
     /// File to which caches are written.
     pub(super) file: RewrittenFile<'m>,
@@ -77,7 +78,7 @@ impl<'m> CacheKeeper<'m> {
         let RenderSetup { settings, workers, .. } = *setup;
         memory.give_back(LOADED);
         let exact = PathIntegrator::<F>::gather_scratch(EXACT);
-        let reserve = super::ThreadedAudit::<F>::bytes(setup, true);
+        let reserve = ThreadedAudit::<F>::bytes(setup, true);
         let needed = (exact.bytes() * workers.count()).saturating_add(reserve);
         let survey = match settings.survey.filter(|_| memory.has(needed)) {
             Some(points) => Some((points, memory.take_each("survey", exact, workers.count())?)),
@@ -108,7 +109,7 @@ impl<'m> CacheKeeper<'m> {
             *half = Half::of(cache, gathered);
         }
         let header = &self.header;
-        self.file.keep(last, |path, patience| cache_file::write(path, header, caches, patience));
+        self.file.keep(last, |path, patience| files::write_cache(path, header, caches, patience));
     }
 
     /// Survey of the caches, if the settings ask for one.

@@ -5,41 +5,55 @@ mod photon_view;
 #[cfg(test)]
 mod wrong;
 
-pub use halflight_core::cache::radiance::{Basis, LobeSettings};
-pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Method, PhotonSettings};
 pub use photon_view::{MapView, PhotonView};
 
 use super::audit::ThreadedAudit;
+use super::files::RewrittenFile;
 use super::memory::Memory;
-use super::rewritten_file::RewrittenFile;
-use super::run::path_settings;
+use super::setup::RenderSetup;
 use super::survey::Survey;
-use super::threads::{ThreadedRound, Threads, Workers};
-use super::{RenderError, Settings};
+use super::threads::{ThreadedRound, Threads};
+use super::{Method, RenderError, hidden_light};
 use crate::save::Patience;
 use cache_keeper::{CacheKeeper, LoadedCaches};
 use halflight_core::audit::{AuditedMethod, Borrower, audit_fraction};
 use halflight_core::bsdf::Features;
-use halflight_core::bvh::Bvh;
 use halflight_core::cache::irradiance::IrradianceCache;
 use halflight_core::findings::Findings;
-use halflight_core::light::LightSampler;
 use halflight_core::memory::{Line, OutOfMemory};
 use halflight_core::method::cached_paths::KeptCaches;
-use halflight_core::method::choice::Goal;
-use halflight_core::method::{
-    Attempt as CoreAttempt, ChosenMethod, MethodOptions, MethodPlan, MethodSetup, PathOptions, PilotSize,
-    RenderContext, RenderMethod, rays_per_second,
-};
-use halflight_core::scene::Scene;
-use halflight_core::transport::{PathIntegrator, PathSettings};
+use halflight_core::method::hidden_light::HiddenLight;
+use halflight_core::method::{Attempt as CoreAttempt, ChosenMethod, MethodPlan, MethodSetup, RenderMethod};
+use halflight_core::transport::PathIntegrator;
 
 /// Outcome of setting a method up.
 pub(super) enum Attempt<'a, 'm, F> {
     /// The method, with its structures in memory.
-    Ready(Box<dyn Renderer<F> + 'm>),
+    Ready(Box<Ready<'m, F>>),
     /// A prepass prefers this plan, for which the memory of the attempt is to be released first.
     Instead(Box<MethodPlan<'a, F>>),
+}
+
+/// A method with its audit.
+pub(super) struct Ready<'m, F> {
+    pub(super) renderer: Box<dyn Renderer<F> + 'm>,
+    pub(super) audit: Option<ThreadedAudit<'m, F>>,
+    /// Light that the method cannot find.
+    pub(super) hidden: Option<HiddenLight>,
+}
+
+impl<'m, F: Features> Ready<'m, F> {
+    /// Prepares the audit of `renderer`, and measures the light that it cannot find.
+    fn with_audit<'a: 'm>(
+        renderer: Box<dyn Renderer<F> + 'm>,
+        setup: &RenderSetup<'a>,
+        memory: &mut Memory<'m>,
+    ) -> Result<Attempt<'a, 'm, F>, RenderError> {
+        let method = renderer.chosen();
+        let audit = ThreadedAudit::new(setup, memory, method)?;
+        let hidden = hidden_light::measure::<F>(setup, memory, method, &renderer.findings())?;
+        Ok(Attempt::Ready(Self { renderer, audit, hidden }.into()))
+    }
 }
 
 /// Takes memory and sets up the method of `plan`.
@@ -49,12 +63,12 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     memory: &mut Memory<'m>,
 ) -> Result<Attempt<'a, 'm, F>, RenderError> {
     let loaded = LoadedCaches::open(plan.kind(), setup, memory)?;
-    let core = setup.of_core::<F>(loaded.kept());
+    let core = of_core::<F>(setup, loaded.kept());
     let core = plan.within_memory(core, setup.workers.count(), memory.available());
     let mut scratch = memory.take_each("paths", plan.scratch(&core), setup.workers.count())?;
     #[cfg(test)]
     if setup.settings.is_wrong {
-        return Ok(Attempt::Ready(Box::new(wrong::Wrong::<F>::new(setup, memory)?)));
+        return Ready::with_audit(Box::new(wrong::Wrong::<F>::new(setup, memory)?), setup, memory);
     }
     let mut executor = Threads::new(setup.workers, &mut scratch);
     let method = match plan.set_up(&core, memory, &mut executor)? {
@@ -65,91 +79,24 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
         Some(_) => Some(CacheKeeper::new::<F>(loaded, setup, memory)?),
         None => None,
     };
-    Ok(Attempt::Ready(Box::new(Threaded { setup: *setup, method, scratch, keeper })))
+    Ready::with_audit(Box::new(Threaded { setup: *setup, method, scratch, keeper }), setup, memory)
 }
 
-/// Structures that all methods use.
-#[derive(Clone, Copy)]
-pub(super) struct RenderSetup<'a> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) bvh: Bvh<'a>,
-    pub(super) lights: LightSampler<'a>,
-    pub(super) settings: &'a Settings,
-    pub(super) workers: &'a Workers<'a>,
-}
-
-impl<'a> RenderSetup<'a> {
-    /// Path tracer of the picture, with another `seed`.
-    pub(super) fn paths<F: Features>(&self, seed: u32) -> PathIntegrator<'a, F> {
-        let Self { scene, bvh, lights, settings, .. } = *self;
-        let paths = PathSettings { seed, ..path_settings(settings) };
-        PathIntegrator::new(scene, &bvh, &lights, paths, settings.level)
-    }
-
-    /// End of the picture.
-    pub(super) fn goal(&self) -> Goal {
-        let stop = &self.settings.stop;
-        let rays = rays_per_second(self.scene.mesh.triangles.len()) * self.workers.count() as f64;
-        let rays = stop.seconds.map(|seconds| seconds * rays);
-        Goal { rays, samples: stop.most_samples(), error: stop.error }
-    }
-
-    /// Context for methods of the core.
-    pub(super) fn context(&self) -> RenderContext<'a> {
-        let Self { scene, bvh, lights, settings, .. } = *self;
-        let pilots = self.goal().rays_alone().map_or(PilotSize::USUAL, PilotSize::of_picture);
-        let paths = path_settings(settings);
-        RenderContext { scene, bvh, lights, settings: paths, level: settings.level, pilots }
-    }
-
-    /// Setup of a method of the core, with the records of a file.
-    fn of_core<'s, F: Features>(&self, kept: KeptCaches<'s>) -> MethodSetup<'a, 's> {
-        let settings = self.settings;
-        let keeps_records = settings.save_cache.is_some();
-        MethodSetup {
-            context: self.context(),
-            options: settings.options(),
-            goal: self.goal(),
-            shards: settings.shard.count,
-            reserve: [false, true].map(|is_biased| ThreadedAudit::<F>::bytes(self, is_biased)),
-            is_audited: audit_fraction(settings.audit, true).is_some(),
-            kept,
-            widens: !keeps_records,
-            has_fixed_records: settings.load_cache.is_some() || keeps_records,
-            lacks_memory: false,
-        }
-    }
-}
-
-impl Settings {
-    /// Options of all methods.
-    pub(super) fn options(&self) -> MethodOptions {
-        MethodOptions {
-            paths: PathOptions { reuse: self.reuse, caustics: self.caustics },
-            cache: self.cache,
-            lobes: self.lobes,
-            photons: self.photons,
-            bidirectional: self.bidirectional,
-            virtual_lights: self.virtual_lights,
-            metropolis: self.metropolis,
-        }
-    }
-
-    /// The part of the settings that determines a picture of `method` and of no other, as text.
-    pub(super) fn of_method(&self, method: Method) -> String {
-        match method {
-            Method::Path => String::new(),
-            Method::IrradianceCache => format!(", {:?}", self.cache),
-            Method::RadianceCache => format!(", {:?}, {:?}", self.cache, self.lobes),
-            Method::PhotonMap | Method::ProgressivePhotons => format!(", {:?}", self.photons),
-            Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
-                format!(", {:?}", self.bidirectional)
-            }
-            Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
-                format!(", {:?}", self.virtual_lights)
-            }
-            Method::Metropolis => format!(", {:?}", self.metropolis),
-        }
+/// Setup of a method of the core, with the records of a file.
+fn of_core<'a, 's, F: Features>(setup: &RenderSetup<'a>, kept: KeptCaches<'s>) -> MethodSetup<'a, 's> {
+    let settings = setup.settings;
+    let keeps_records = settings.save_cache.is_some();
+    MethodSetup {
+        context: setup.context(),
+        options: settings.options(),
+        goal: setup.goal(),
+        shards: settings.shard.count,
+        reserve: [false, true].map(|is_biased| ThreadedAudit::<F>::bytes(setup, is_biased)),
+        is_audited: audit_fraction(settings.audit, true).is_some(),
+        kept,
+        widens: !keeps_records,
+        has_fixed_records: settings.load_cache.is_some() || keeps_records,
+        lacks_memory: false,
     }
 }
 

@@ -1,8 +1,8 @@
 //! Pictures of photon maps for a report: positions and density of photons, radii of density estimates, and
 //! the share of photons that the camera sees.
 
-use super::RenderSetup;
 use crate::memory::lines;
+use crate::render::setup::RenderSetup;
 use halflight_core::bsdf::Features;
 use halflight_core::geometry::Ray;
 use halflight_core::memory::{Arena, OutOfMemory};

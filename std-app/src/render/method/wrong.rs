@@ -1,10 +1,11 @@
 //! A deliberately biased method: the right half of the picture is a tenth too bright, like a cache with 10 %
 //! too much irradiance. Its noise does not reveal the bias.
 
-use super::{Method, RenderSetup, Renderer};
-use crate::render::RenderError;
+use super::Renderer;
 use crate::render::memory::Memory;
+use crate::render::setup::RenderSetup;
 use crate::render::threads::ThreadedRound;
+use crate::render::{Method, RenderError};
 use core::ops::Range;
 use halflight_core::audit::AuditedMethod;
 use halflight_core::bsdf::Features;

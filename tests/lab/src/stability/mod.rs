@@ -14,7 +14,7 @@ mod view;
 
 use crate::output::Output;
 use clap::Args;
-use halflight::report::quantity::plural;
+use halflight::quantity::plural;
 use scene::{Measured, TestScene};
 use serde_json::{Value, json};
 

@@ -1,6 +1,6 @@
-//! Layers of the core: a folder imports only from lower folders, also within light transport, and the files
-//! of a folder do not import each other in a cycle. The `mod.rs` of a folder re-exports items of its files,
-//! and its files may import it.
+//! Layers of the core: a folder imports only from lower folders, also within light transport. In the core and
+//! in the app the files and folders of a folder do not import each other in a cycle. The `mod.rs` of a folder
+//! re-exports items of its files, and its files may import it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,7 +43,13 @@ const TRANSPORT: &[&str] = &[
     "metropolis",
 ];
 
-/// A file of core/src: its path below that folder, and its numbered lines of code.
+/// Folder of the core.
+const CORE: &str = "core/src";
+
+/// Roots of crates that are checked, each before those that contain it.
+pub(crate) const ROOTS: [&str; 3] = [CORE, "std-app/src/cli", "std-app/src"];
+
+/// A file of a crate: its path below that folder, and its numbered lines of code.
 pub(crate) struct Source<'t> {
     pub name: &'t str,
     pub code: Vec<(usize, &'t str)>,
@@ -52,16 +58,18 @@ pub(crate) struct Source<'t> {
 /// A path of modules from the crate root, optionally ending in an item.
 type Path = Vec<String>;
 
-/// A complaint for each import from a higher layer and for each import cycle.
-pub(crate) fn check(sources: &[Source]) -> Vec<String> {
+/// A complaint for each import cycle of the crate in folder `root`, and for each import from a higher layer
+/// of the core.
+pub(crate) fn check(root: &str, sources: &[Source]) -> Vec<String> {
     let tree = Tree::new(sources);
     let mut complaints = Vec::new();
     let mut edges: BTreeMap<Path, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
     for (source, imports) in sources.iter().zip(&tree.imports) {
         let from = module_of(source.name);
+        let layer = |path: &[String], depth: usize| if root == CORE { layer(path, depth) } else { Ok(None) };
         if let Some(missing) = (0..from.len()).find(|depth| layer(&from, *depth).is_err()) {
             let missing = &from[missing];
-            complaints.push(format!("core/src/{}: `{missing}` is not among the layers", source.name));
+            complaints.push(format!("{root}/{}: `{missing}` is not among the layers", source.name));
             continue;
         }
         for import in imports {
@@ -70,9 +78,9 @@ pub(crate) fn check(sources: &[Source]) -> Vec<String> {
             match (from.get(shared), to.get(shared)) {
                 (Some(lower), Some(higher)) if layer(&to, shared) > layer(&from, shared) => {
                     let (name, line) = (source.name, import.line);
-                    complaints.push(format!("core/src/{name}:{line}: `{higher}` is a layer above `{lower}`"));
+                    complaints.push(format!("{root}/{name}:{line}: `{higher}` is a layer above `{lower}`"));
                 }
-                (Some(a), Some(b)) if shared > 0 => {
+                (Some(a), Some(b)) => {
                     let folder = edges.entry(from[..shared].to_vec()).or_default();
                     folder.entry(a.clone()).or_default().insert(b.clone());
                 }
@@ -83,7 +91,7 @@ pub(crate) fn check(sources: &[Source]) -> Vec<String> {
     complaints.extend(edges.into_iter().filter_map(|(folder, edges)| {
         let names = circle(edges);
         (!names.is_empty())
-            .then(|| format!("core/src/{}: {} import in a circle", folder.join("/"), names.join(", ")))
+            .then(|| format!("{root}/{}: {} import in a circle", folder.join("/"), names.join(", ")))
     }));
     complaints
 }
@@ -104,7 +112,7 @@ fn layer(path: &[String], depth: usize) -> Result<Option<usize>, ()> {
 fn module_of(name: &str) -> Path {
     let path = name.strip_suffix(".rs").unwrap_or(name);
     let mut path: Path = path.split('/').map(str::to_owned).collect();
-    path.pop_if(|last| last == "mod" || last == "lib");
+    path.pop_if(|last| last == "mod" || last == "lib" || last == "main");
     path
 }
 
@@ -262,7 +270,7 @@ mod tests {
         };
         let files: Vec<(&'static str, &'static str)> =
             files.iter().map(|&(a, b)| (leak(a), leak(b))).collect();
-        check(&files.iter().map(source).collect::<Vec<_>>())
+        check(CORE, &files.iter().map(source).collect::<Vec<_>>())
     }
 
     fn leak(text: &str) -> &'static str {
@@ -303,6 +311,17 @@ mod tests {
         // A file that only imports from the cycle is not part of it.
         let c = ("bvh/c.rs", "use super::a::A;\n");
         assert_eq!(complaints(&[face, a, b, c]), ["core/src/bvh: a, b import in a circle"]);
+    }
+
+    #[test]
+    fn folders_of_the_app_form_no_circle() {
+        let source = |name, line| Source { name, code: vec![(1, line)] };
+        let sources =
+            [source("load/mod.rs", "use crate::render::A;"), source("render/mod.rs", "use crate::load::B;")];
+        assert_eq!(check("std-app/src", &sources), ["std-app/src/: load, render import in a circle"]);
+        assert_eq!(check("std-app/src", &sources[..1]), [""; 0]);
+        let face = source("main.rs", "use load::B;");
+        assert_eq!(check("std-app/src", &[face, source("load.rs", "use crate::Other;")]), [""; 0]);
     }
 
     #[test]

@@ -10,8 +10,6 @@ const LONG_FILES: &[(&str, usize)] = &[
     ("simd/src/baseline.rs", 418),
     ("simd/src/kernels/shade/tests.rs", 562),
     ("simd/src/x86/avx2.rs", 474),
-    ("std-app/src/render/cache_file.rs", 435),
-    ("std-app/src/render/picture.rs", 426),
     ("tests/tests/caustics.rs", 476),
 ];
 
@@ -23,7 +21,6 @@ const LONG_FUNCTIONS: &[(&str, usize)] = &[
     ("fuzz/src/shading.rs: attempt", 169),
     ("simd/src/kernels/shade/tests.rs: scattering_agrees_with_the_reference_on_every_level", 89),
     ("tests/lab/src/bench/shade/data.rs: new", 104),
-    ("std-app/src/render/run.rs: run", 114),
     ("tests/tests/caustics.rs: guided_photons_reach_a_small_mirror_with_the_right_power", 82),
 ];
 

@@ -124,7 +124,7 @@ fn check_sources(files: &[&File]) -> Vec<String> {
         test_modules.iter().any(|module| path.starts_with(module) || *path == module.with_extension("rs"))
     };
     let mut complaints = limits::check_exceptions(files.iter().map(|file| file.name.as_str()));
-    let mut core = Vec::new();
+    let mut crates = layers::ROOTS.map(|root| (root, Vec::new()));
     for File { name, path, text } in files {
         complaints.extend(limits::check(name, text));
         complaints.extend(names::check(name, text));
@@ -133,8 +133,13 @@ fn check_sources(files: &[&File]) -> Vec<String> {
         }
         if !in_test(path) {
             complaints.extend(broken_rules(name, text));
-            let below = name.strip_prefix("core/src/");
-            core.extend(below.map(|name| Source { name, code: code(text) }));
+            let of_crate = crates.iter_mut().find_map(|(root, sources)| {
+                let below = name.strip_prefix(*root)?.strip_prefix('/')?;
+                Some((below, sources))
+            });
+            if let Some((name, sources)) = of_crate {
+                sources.push(Source { name, code: code(text) });
+            }
         }
     }
     for (root, program) in TEST_PROGRAMS {
@@ -144,7 +149,7 @@ fn check_sources(files: &[&File]) -> Vec<String> {
             modules_left_out(text, names).map(|name| format!("{root}{name}: {program} does not name it")),
         );
     }
-    complaints.extend(layers::check(&core));
+    complaints.extend(crates.iter().flat_map(|(root, sources)| layers::check(root, sources)));
     complaints
 }
 

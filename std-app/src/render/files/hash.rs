@@ -1,4 +1,4 @@
-//! 64-bit hash: checksum of film files and fingerprint of scenes. Detects accidents, not manipulation.
+//! 64-bit hash: checksum of files and fingerprint of scenes. Detects accidents, not manipulation.
 
 use halflight_core::sampling::mix;
 

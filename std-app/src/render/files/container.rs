@@ -1,16 +1,14 @@
-//! Sealed files, the container of films and caches: name and version, JSON header, sections of bytes, and a
-//! checksum over all of it (docs/film-file.md).
+//! Container of films and caches: name and version, JSON header, sections of bytes, and a checksum over all
+//! of it (docs/file-container.md).
 //!
 //! Files are replaced atomically (`save::file`): a killed program leaves either the old or the new file,
 //! complete.
 
-mod hash;
-
-pub(super) use hash::Hash;
-
-use super::error::FileError;
+use super::hash::Hash;
+use crate::file_error::FileError;
 use crate::memory::Shortage;
 use crate::save::{Patience, replace_with};
+use bytemuck::Pod;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::File;
@@ -39,6 +37,9 @@ impl Kind {
     }
 }
 
+/// Values per section of a list.
+const AT_ONCE: usize = 1 << 12;
+
 /// Memory per byte of a header's JSON text; lists of one-digit numbers need most.
 const HEADER: usize = 24;
 
@@ -53,6 +54,11 @@ impl Writer<'_> {
     pub(super) fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.hash.section(bytes);
         self.file.write_all(bytes)
+    }
+
+    /// Adds a list in sections.
+    pub(super) fn put_list<T: Pod>(&mut self, values: &[T]) -> io::Result<()> {
+        values.chunks(AT_ONCE).try_for_each(|values| self.put(bytemuck::cast_slice(values)))
     }
 }
 
@@ -158,6 +164,22 @@ impl<'r> Reader<'r> {
         self.file.read_exact(bytes).map_err(|error| FileError::io(&error).at(&self.path))?;
         self.hash.section(bytes);
         Ok(())
+    }
+
+    /// Reads a list of `left` values in sections.
+    pub(super) fn get_list<T: Pod>(&mut self, mut left: usize) -> Result<Vec<T>, FileError> {
+        let (mut values, mut section) = (Vec::new(), vec![T::zeroed(); left.min(AT_ONCE)]);
+        let needed = left * size_of::<T>();
+        if values.try_reserve_exact(left).is_err() {
+            return Err(self.refusal(format!("cannot be read: there are no {needed} bytes of memory")));
+        }
+        while left > 0 {
+            let some = &mut section[..left.min(AT_ONCE)];
+            self.get(bytemuck::cast_slice_mut(some))?;
+            values.extend_from_slice(some);
+            left -= some.len();
+        }
+        Ok(values)
     }
 
     /// Verifies the checksum and the end of the file.

@@ -1,31 +1,29 @@
-//! Film files: checkpoints of a render, and shards to merge. Format: docs/film-file.md.
+//! Film files: checkpoints of a render, and shards to merge. Format: docs/file-container.md.
 
-mod audit;
-mod header;
-mod identity;
-
-pub(super) use header::Header;
-pub(super) use identity::Identity;
-
-use super::MOST_PIXELS;
-use super::error::FileError;
-use super::sealed::{self, Kind};
+use super::container::{self, Kind};
+use super::film_header::FilmHeader;
+use super::identity::Identity;
+use crate::file_error::FileError;
+use crate::render::MOST_PIXELS;
 use crate::save::Patience;
-use halflight_core::film::{PIXELS_PER_TILE, Pixel, Tile};
+use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::method::{RenderState, Shard};
+use halflight_core::transport::Counters;
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLFILM", version: 8, name: "film" };
+const KIND: Kind = Kind { magic: *b"HLFILM", version: 9, name: "film" };
 
 /// Writes the film of `state` to `path`, completely or not at all.
-pub(super) fn write(
+pub(in crate::render) fn write(
     path: &Path,
-    header: &Header,
+    header: &FilmHeader,
     state: &RenderState,
     patience: Patience,
 ) -> Result<(), FileError> {
-    sealed::write(path, &KIND, header, patience, |file| {
-        file.put(bytemuck::cast_slice(state.samples))?;
+    container::write(path, &KIND, header, patience, |file| {
+        file.put(bytemuck::bytes_of(&state.counters))?;
+        file.put_list(state.dropped)?;
+        file.put_list(state.samples)?;
         let tiles = tiles(state.film.pixels(), state.samples);
         tiles.into_iter().try_for_each(|pixels| file.put(bytemuck::cast_slice(pixels)))
     })
@@ -38,26 +36,27 @@ fn tiles<'a>(pixels: &'a [Pixel], taken: &'a [u32]) -> impl Iterator<Item = &'a 
 }
 
 /// A film file after its header was read.
-pub(super) struct Reader {
-    file: sealed::Reader<'static>,
-    pub(super) header: Header,
+pub(in crate::render) struct Reader {
+    file: container::Reader<'static>,
+    pub(in crate::render) header: FilmHeader,
 }
 
 impl Reader {
     /// Opens `path` and reads its header, within `most` bytes.
-    pub(super) fn open(path: &Path, most: usize) -> Result<Self, FileError> {
-        let (file, header): (_, Header) = sealed::Reader::open(path, &KIND, most)?;
+    pub(in crate::render) fn open(path: &Path, most: usize) -> Result<Self, FileError> {
+        let (file, header): (_, FilmHeader) = container::Reader::open(path, &KIND, most)?;
         let Shard { index, count } = header.shard();
         let [width, height] = header.size();
         if index >= count || !(1..=MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
             return Err(file.damage("there is no such picture"));
         }
-        file.expect((Tile::count(width, height) * size_of::<u32>()) as u64, 1)?;
+        let each = size_of::<Dropped>() + size_of::<u32>();
+        file.expect((Tile::count(width, height) * each) as u64, 1)?;
         Ok(Self { file, header })
     }
 
     /// Refuses a film of another identity or shard.
-    pub(super) fn check(&self, identity: &Identity, shard: Shard) -> Result<(), FileError> {
+    pub(in crate::render) fn check(&self, identity: &Identity, shard: Shard) -> Result<(), FileError> {
         let words = |shard: Shard| format!("shard {}/{}", shard.index + 1, shard.count);
         let own = self.header.shard();
         let difference = self.header.identity.difference(identity);
@@ -67,7 +66,7 @@ impl Reader {
     }
 
     /// Refuses a film that cannot be merged with `first`.
-    pub(super) fn check_sibling(&self, first: &Self) -> Result<(), FileError> {
+    pub(in crate::render) fn check_sibling(&self, first: &Self) -> Result<(), FileError> {
         let (own, other) = (&self.header, &first.header);
         let refuse = |why: String| {
             let first = first.file.path().display();
@@ -86,13 +85,16 @@ impl Reader {
     }
 
     /// Reads the stored tiles into `state`, a film of the same size.
-    pub(super) fn read_into(mut self, state: &mut RenderState) -> Result<(), FileError> {
+    pub(in crate::render) fn read_into(mut self, state: &mut RenderState) -> Result<(), FileError> {
         let [width, height] = self.header.size();
-        let mut taken = vec![0u32; Tile::count(width, height)];
-        if taken.len() != state.samples.len() {
+        let tiles = Tile::count(width, height);
+        if tiles != state.samples.len() {
             return Err(self.file.damage("it has another size than it says"));
         }
-        self.file.get(bytemuck::cast_slice_mut(&mut taken))?;
+        let mut counters = Counters::default();
+        self.file.get(bytemuck::bytes_of_mut(&mut counters))?;
+        let dropped: Vec<Dropped> = self.file.get_list(tiles)?;
+        let taken: Vec<u32> = self.file.get_list(tiles)?;
         let shard = self.header.shard();
         for (task, pixels) in state.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
             if taken[task] == 0 {
@@ -105,12 +107,8 @@ impl Reader {
             state.samples[task] = taken[task];
         }
         self.file.finish()?;
-        state.counters += self.header.counters();
-        for (tile, dropped) in self.header.dropped() {
-            if let Some(sum) = state.dropped.get_mut(tile) {
-                *sum += dropped;
-            }
-        }
+        state.counters += counters;
+        state.dropped.iter_mut().zip(dropped).for_each(|(sum, dropped)| *sum += dropped);
         Ok(())
     }
 }

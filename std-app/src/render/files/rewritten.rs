@@ -1,14 +1,14 @@
 //! A file rewritten during a render and at its end: film checkpoints and irradiance caches. A failed write
 //! leaves the last complete file, and the next write retries.
 
-use super::FileError;
+use crate::file_error::FileError;
 use crate::save::{Destination, Patience};
 use core::cell::Cell;
 use std::path::Path;
 
 /// A rewritten file; inactive without a path.
 #[derive(Default)]
-pub(super) struct RewrittenFile<'a> {
+pub(in crate::render) struct RewrittenFile<'a> {
     path: Option<&'a Path>,
     /// True if it is a pipe or device, which cannot be replaced and receives only the last write.
     is_stream: bool,
@@ -20,14 +20,14 @@ pub(super) struct RewrittenFile<'a> {
 
 impl<'a> RewrittenFile<'a> {
     /// A file at `path`.
-    pub(super) fn in_file(path: Option<&'a Path>) -> Self {
+    pub(in crate::render) fn in_file(path: Option<&'a Path>) -> Self {
         let is_stream =
             path.is_some_and(|path| Destination::of(path).is_ok_and(|destination| destination.is_stream()));
         Self { path, is_stream, ..Self::default() }
     }
 
     /// Writes during the render.
-    pub(super) fn update(&mut self, write: impl FnOnce(&Path, Patience) -> Result<(), FileError>) {
+    pub(in crate::render) fn update(&mut self, write: impl FnOnce(&Path, Patience) -> Result<(), FileError>) {
         if self.is_stream {
             self.is_owed = true;
         } else {
@@ -36,7 +36,7 @@ impl<'a> RewrittenFile<'a> {
     }
 
     /// Writes during the render; with the `last` patience only after a failed or postponed write.
-    pub(super) fn keep(
+    pub(in crate::render) fn keep(
         &mut self,
         last: Option<Patience>,
         write: impl FnOnce(&Path, Patience) -> Result<(), FileError>,
@@ -49,7 +49,7 @@ impl<'a> RewrittenFile<'a> {
     }
 
     /// Writes at the end unconditionally.
-    pub(super) fn finish(
+    pub(in crate::render) fn finish(
         &mut self,
         patience: Patience,
         write: impl FnOnce(&Path, Patience) -> Result<(), FileError>,
@@ -59,13 +59,13 @@ impl<'a> RewrittenFile<'a> {
     }
 
     /// Why the last write failed; on the first call only.
-    pub(super) fn new_failure(&self) -> Option<FileError> {
+    pub(in crate::render) fn new_failure(&self) -> Option<FileError> {
         let failed = self.failed.clone();
         failed.filter(|_| !self.is_known.replace(true))
     }
 
     /// Why the file is missing or out of date.
-    pub(super) fn failed(&self) -> Option<FileError> {
+    pub(in crate::render) fn failed(&self) -> Option<FileError> {
         self.failed.clone()
     }
 }
