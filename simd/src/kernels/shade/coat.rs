@@ -1,20 +1,23 @@
-//! Coats over diffuse bases at the vertices of a block, over lanes: value, density and sampling, with the
-//! operations of the scalar BSDFs in their order (Ashikhmin et al. 2000, §2.4; Kelemen and Szirmay-Kalos
-//! 2001).
+//! Rough or smooth coat over a diffuse base, over lanes: value, density and sampling. The base receives the
+//! light that the coat transmits on the way in and on the way out (Ashikhmin et al. 2000, §2.4; Kelemen and
+//! Szirmay-Kalos 2001):
+//!
+//! f = D G F / (4 cos θ_o cos θ_i) + base · T(θ_o) T(θ_i) / π
+//!
+//! The model is symmetric in the directions, hence reciprocal.
 //!
 //! A microfacet of a dielectric coat reflects tint · F + metal + (metallic - metal) · S, with Fresnel's F and
 //! S = (1 - c)^5. One of a coat of Schlick reflects metal + (1 - metal) · S. The part of a coat that depends
 //! on the viewer is computed once a vertex.
 
-use super::bsdf::{frame, to_local, viewer};
-use super::coat_tables::{AMPLITUDES, CoatTables, LAST_AMPLITUDE, STEP, TablePlace, lerp, place, unit};
-use super::fresnel::{fresnel, schlick_weight};
+use super::bsdf::{SampleLanes, local, viewer};
+use super::coat_tables::{AMPLITUDES, CoatTables, STEP, TablePlace, amplitude, lerp, unit};
+use super::fresnel::{dielectric, schlick_weight};
 use super::ggx::Ggx;
-use super::load::{All, Load, One};
 use super::scatter::ScatterBlock;
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, divide, mul, scale, sub};
-use super::{Row, Row3, load3, put, warp};
+use super::{Row, Row3, load2, load3, put, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 use core::f32::consts::FRAC_1_PI;
@@ -71,22 +74,111 @@ impl CoatBlock {
         transmittance: [[0.0; 16]; 3],
         probability: [0.0; 16],
     };
+
+    /// Makes the surface of vertex `i`, below 16, that of `coat`.
+    #[inline]
+    pub fn put(&mut self, i: usize, coat: &CoatLanes<f32>) {
+        put(&mut self.base, i, coat.base);
+        put(&mut self.tint, i, coat.tint);
+        put(&mut self.metal, i, coat.metal);
+        put(&mut self.mean, i, coat.mean);
+        (self.metallic[i & 15], self.alpha[i & 15], self.eta[i & 15]) = (coat.metallic, coat.alpha, coat.eta);
+        self.exists |= 1 << i;
+        self.dielectric |= u32::from(coat.dielectric) << i;
+    }
+
+    /// Coats of the vertices `exists` over lanes.
+    #[inline(always)]
+    pub(super) fn lanes<S: Simd>(&self, simd: S, exists: u32) -> CoatLanes<S::F16> {
+        CoatLanes {
+            base: load3(simd, &self.base),
+            tint: load3(simd, &self.tint),
+            metal: load3(simd, &self.metal),
+            metallic: simd.load16(&self.metallic),
+            alpha: simd.load16(&self.alpha),
+            eta: simd.load16(&self.eta),
+            mean: load3(simd, &self.mean),
+            base_weight: simd.load16(&self.base_weight),
+            exists: simd.mask16(exists),
+            dielectric: simd.mask16(self.dielectric),
+            transmittance: load3(simd, &self.transmittance),
+            probability: simd.load16(&self.probability),
+        }
+    }
+
+    /// Computes the parts that depend on the viewers of `surface`, by the instructions of `level`.
+    pub fn see(&mut self, level: Level, surface: &SurfaceBlock, tables: &CoatTables) {
+        level.dispatch((self, surface, tables));
+    }
+}
+
+impl Kernel for (&mut CoatBlock, &SurfaceBlock, &CoatTables) {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let (block, surface, tables) = self;
+        let [.., c] = viewer(load3(simd, &surface.wo));
+        let CoatLanes { transmittance, probability, .. } = block.lanes(simd, block.exists).see(tables, c);
+        (block.transmittance, block.probability) = (vector::to_arrays(transmittance), probability.to_array());
+    }
 }
 
 /// Coats over lanes.
-pub(super) struct CoatLanes<L: Lanes> {
-    pub(super) base: [L; 3],
-    tint: [L; 3],
-    metal: [L; 3],
-    metallic: L,
-    pub(super) alpha: L,
-    eta: L,
-    mean: [L; 3],
-    base_weight: L,
-    pub(super) exists: L::Mask,
-    dielectric: L::Mask,
-    pub(super) transmittance: [L; 3],
-    pub(super) probability: L,
+#[derive(Clone, Copy)]
+pub struct CoatLanes<L: Lanes> {
+    /// Factors of the bases.
+    pub base: [L; 3],
+    /// Factors of Fresnel's reflectance; reflectances at normal incidence of coats of Schlick.
+    pub tint: [L; 3],
+    /// Reflectances of the metals at normal incidence; of coats of Schlick with their metals.
+    pub metal: [L; 3],
+    /// Fractions of the metals; 1 for coats of Schlick.
+    pub metallic: L,
+    /// GGX alpha; 0 is smooth.
+    pub alpha: L,
+    /// Indices of refraction; above 1 for coats of Schlick, which do not use it.
+    pub eta: L,
+    /// Mean transmittances for uniform light from the bases.
+    pub mean: [L; 3],
+    /// Weights of the bases in the choice of the lobe.
+    pub base_weight: L,
+    /// Lanes with a coat.
+    pub exists: L::Mask,
+    /// Those of a dielectric. Others are coats of Schlick.
+    pub dielectric: L::Mask,
+    /// Transmittances T(θ_o), by [`CoatLanes::see`].
+    pub transmittance: [L; 3],
+    /// Probabilities of the coats in the choice of the lobe, by [`CoatLanes::see`].
+    pub probability: L,
+}
+
+impl CoatLanes<f32> {
+    /// Smooth black coat of Schlick over a black base.
+    pub const SMOOTH: Self = Self {
+        base: [0.0; 3],
+        tint: [0.0; 3],
+        metal: [0.0; 3],
+        metallic: 0.0,
+        alpha: 0.0,
+        eta: 1.5,
+        mean: [0.0; 3],
+        base_weight: 1.0,
+        exists: true,
+        dielectric: false,
+        transmittance: [1.0; 3],
+        probability: 0.0,
+    };
+}
+
+/// Transmittance of coats, and the numbers that it shares with their albedos.
+struct Transmitted<L: Lanes> {
+    transmittance: [L; 3],
+    /// Fresnel's reflectance of dielectric coats.
+    fresnel: L,
+    /// Albedos for F = 1 and F = (1 - c)^5.
+    white: L,
+    edge: L,
 }
 
 impl<L: Lanes> CoatLanes<L> {
@@ -105,165 +197,160 @@ impl<L: Lanes> CoatLanes<L> {
 
     /// Reflectance of a microfacet at the cosine `c`.
     #[inline(always)]
-    pub(super) fn reflectance(&self, c: L) -> [L; 3] {
-        self.mix(fresnel(c, self.eta), schlick_weight(c))
+    pub fn reflectance(&self, c: L) -> [L; 3] {
+        let fresnel = if self.dielectric.any() { dielectric(c, self.eta) } else { c };
+        self.mix(fresnel, schlick_weight(c))
     }
 
     /// `f0 · (white - edge) + edge`: albedo of a coat of Schlick.
     #[inline(always)]
-    fn albedo(f0: [L; 3], [white, edge]: [L; 2]) -> [L; 3] {
+    fn albedo(f0: [L; 3], white: L, edge: L) -> [L; 3] {
         add(scale(f0, white - edge), [edge; 3])
     }
 
-    /// Transmittance at the cosine `c`, and the albedos of coats of Schlick for F = 1 and F = (1 - c)^5. The
-    /// albedos of dielectric coats are computed if `all`.
+    /// Transmittance at the cosine `c`; the albedos of dielectric coats are computed if `all`.
     #[inline(always)]
-    pub(super) fn transmittance(&self, tables: &CoatTables, c: L, all: bool) -> ([L; 3], [L; 2]) {
-        let (one, step) = (c.all(1.0), c.all(STEP));
-        let amplitudes = c.all(AMPLITUDES as f32);
-        let (rough, smooth) = (self.rough(), one - fresnel(c, self.eta));
-        let (mut dielectric, mut white, mut edge) = (smooth, one, schlick_weight(c));
-        let at = TablePlace::new(c, self.alpha);
-        if (rough & self.dielectric).any() {
-            let amplitude = (self.eta - one) / (self.eta + one) / c.all(LAST_AMPLITUDE);
-            let [k, t] = place(amplitude, AMPLITUDES);
-            let difference = lerp(at.value(tables, k), at.value(tables, k + one), t);
-            dielectric = unit(smooth + step * difference).select(rough, smooth);
+    fn transmitted(&self, tables: &CoatTables, c: L, all: bool) -> Transmitted<L> {
+        let (one, step, amplitudes) = (c.all(1.0), c.all(STEP), c.all(AMPLITUDES as f32));
+        let rough = self.rough() & self.exists;
+        let (mut fresnel, mut white, mut edge) = (c, one, schlick_weight(c));
+        if self.dielectric.any() {
+            fresnel = dielectric(c, self.eta);
         }
-        let of_schlick = if all { rough } else { rough & !self.dielectric };
-        if of_schlick.any() {
-            white = unit(one + step * at.value(tables, amplitudes)).select(rough, one);
-            edge = unit(edge + step * at.value(tables, amplitudes + one)).select(rough, edge);
+        let mut of_dielectric = one - fresnel;
+        if rough.any() {
+            let at = TablePlace::new(c, self.alpha);
+            if (rough & self.dielectric).any() {
+                let [k, t] = amplitude(self.eta);
+                let difference = lerp(at.value(tables, k), at.value(tables, k + one), t);
+                of_dielectric = unit(of_dielectric + step * difference).select(rough, of_dielectric);
+            }
+            if all || (rough & !self.dielectric).any() {
+                white = unit(one + step * at.value(tables, amplitudes)).select(rough, one);
+                edge = unit(edge + step * at.value(tables, amplitudes + one)).select(rough, edge);
+            }
         }
-        let of_schlick = sub([one; 3], Self::albedo(self.tint, [white, edge]));
-        (vector::select(self.dielectric, [dielectric; 3], of_schlick), [white, edge])
+        let of_schlick = sub([one; 3], Self::albedo(self.tint, white, edge));
+        let transmittance = vector::select(self.dielectric, [of_dielectric; 3], of_schlick);
+        Transmitted { transmittance, fresnel, white, edge }
     }
 
-    /// T(θ_o) and the probability of the coat for a viewer at the cosine `c`.
+    /// Transmittance T at the cosine `c`.
     #[inline(always)]
-    fn see(&self, tables: &CoatTables, c: L) -> ([L; 3], L) {
+    pub fn transmittance(&self, tables: &CoatTables, c: L) -> [L; 3] {
+        self.transmitted(tables, c, false).transmittance
+    }
+
+    /// `self` with T(θ_o) and the probability of the coat for a viewer at the cosine `c`: the fraction of the
+    /// coat in the energy that leaves, with the weights [`COAT_WEIGHT`] and `base_weight`.
+    #[inline(always)]
+    #[must_use]
+    pub fn see(self, tables: &CoatTables, c: L) -> Self {
         let (zero, one) = (c.all(0.0), c.all(1.0));
         let sum = |[a, b, c]: [L; 3]| a + b + c;
-        let (transmittance, [white, edge]) = self.transmittance(tables, c, true);
-        let amplitude = (self.eta - one) / (self.eta + one);
-        let by_table = edge + amplitude * amplitude * (white - edge);
-        let of_dielectric = self.mix(by_table.select(self.rough(), fresnel(c, self.eta)), edge);
-        let of_schlick = Self::albedo(self.metal, [white, edge]);
-        let albedo = vector::select(self.dielectric, of_dielectric, of_schlick);
+        let Transmitted { transmittance, fresnel, white, edge } = self.transmitted(tables, c, true);
+        let mut albedo = Self::albedo(self.metal, white, edge);
+        if self.dielectric.any() {
+            // The albedo tables of Schlick's coat also serve the dielectric coat.
+            let amplitude = (self.eta - one) / (self.eta + one);
+            let by_table = edge + amplitude * amplitude * (white - edge);
+            let of_dielectric = self.mix(by_table.select(self.rough(), fresnel), edge);
+            albedo = vector::select(self.dielectric, of_dielectric, albedo);
+        }
         let coat = c.all(COAT_WEIGHT) * sum(albedo);
         let base = sum(mul(mul(self.base, transmittance), self.mean)) * self.base_weight;
         let probability = unit(coat / (coat + base)).select(zero.lt(base), one);
-        (transmittance, probability)
+        Self { transmittance, probability, ..self }
     }
 
-    /// base · T(θ_o) · T(θ_i), and f cos θ_i and density of base and rough coat together, zeros below the
-    /// horizon.
+    /// base · T(θ_o) · T(θ_i).
     #[inline(always)]
-    fn evaluate(&self, tables: &CoatTables, wo: [L; 3], wi: [L; 3]) -> ([L; 3], [L; 3], L) {
-        let (zero, one) = (wi[2].all(0.0), wi[2].all(1.0));
-        let (lambert, p) = (wi[2] * zero.all(FRAC_1_PI), self.probability);
-        let (transmittance, _) = self.transmittance(tables, wi[2], false);
-        let base = mul(mul(self.base, self.transmittance), transmittance);
-        let mut value = scale(base, lambert);
-        let mut pdf = (one - p) * lambert;
-        let above = zero.lt(wi[2]);
-        let rough = self.rough() & above & self.exists;
+    fn reflected(&self, tables: &CoatTables, wi: [L; 3]) -> [L; 3] {
+        mul(mul(self.base, self.transmittance), self.transmittance(tables, wi[2]))
+    }
+
+    /// f cos θ_i of the base alone, for `wi` above the horizon.
+    #[inline(always)]
+    pub fn base_value(&self, tables: &CoatTables, wi: [L; 3]) -> [L; 3] {
+        scale(self.reflected(tables, wi), wi[2] * wi[2].all(FRAC_1_PI))
+    }
+
+    /// f cos θ_i of rough coats alone, and the density of their samples without the probability of the choice.
+    #[inline(always)]
+    pub(super) fn lobe(&self, wo: [L; 3], wi: [L; 3]) -> ([L; 3], L) {
+        let ggx = Ggx::new(self.alpha);
+        let h = add(wo, wi);
+        let reflectance = self.reflectance(dot(wo, h) / vector::length(h));
+        let lobe = ggx.density(h) * ggx.visibility(wo, wi) * wi[2];
+        (scale(reflectance, lobe), ggx.reflection_density(wo, h))
+    }
+
+    /// f cos θ_i and density of base and rough coat together, zeros below the horizon.
+    #[inline(always)]
+    pub fn evaluate(&self, tables: &CoatTables, wo: [L; 3], wi: [L; 3]) -> ([L; 3], L) {
+        let above = wi[2].all(0.0).lt(wi[2]);
+        let (value, pdf) = self.both(self.reflected(tables, wi), wo, wi);
+        (vector::select(above, value, [wi[2].all(0.0); 3]), pdf.select(above, wi[2].all(0.0)))
+    }
+
+    /// [`CoatLanes::evaluate`] above the horizon, for known base · T(θ_o) · T(θ_i).
+    #[inline(always)]
+    fn both(&self, reflected: [L; 3], wo: [L; 3], wi: [L; 3]) -> ([L; 3], L) {
+        let (one, lambert, p) = (wi[2].all(1.0), wi[2] * wi[2].all(FRAC_1_PI), self.probability);
+        let (mut value, mut pdf) = (scale(reflected, lambert), (one - p) * lambert);
+        let rough = self.rough() & self.exists & one.all(0.0).lt(wi[2]);
         if rough.any() {
-            let ggx = Ggx::new(self.alpha);
-            let h = add(wo, wi);
-            let reflectance = self.reflectance(dot(wo, h) / vector::length(h));
-            let lobe = ggx.density(h) * ggx.visibility(wo, wi) * wi[2];
-            value = vector::select(rough, add(value, scale(reflectance, lobe)), value);
-            pdf = (pdf + p * ggx.reflection_density(wo, h)).select(rough, pdf);
+            let (lobe, density) = self.lobe(wo, wi);
+            value = vector::select(rough, add(value, lobe), value);
+            pdf = (pdf + p * density).select(rough, pdf);
         }
-        (base, vector::select(above, value, [zero; 3]), pdf.select(above, zero))
+        (value, pdf)
+    }
+
+    /// Directions of the lobes that are chosen: of the coat in the lanes `of_coat`, which are rough, of the
+    /// base elsewhere.
+    #[inline(always)]
+    pub(super) fn direction(&self, of_coat: L::Mask, wo: [L; 3], u: [L; 2]) -> [L; 3] {
+        let mut direction = wo;
+        if (!of_coat).any() {
+            direction = warp::cosine_hemisphere(u);
+        }
+        if of_coat.any() {
+            let reflected = Ggx::new(self.alpha).sample_reflection(wo, u);
+            direction = vector::select(of_coat, reflected, direction);
+        }
+        direction
     }
 
     /// Samples a direction.
     #[inline(always)]
-    fn sample(&self, tables: &CoatTables, wo: [L; 3], [u, v, lobe]: [L; 3]) -> SampleLanes<L> {
+    pub fn sample(&self, tables: &CoatTables, wo: [L; 3], [u, v, lobe]: [L; 3]) -> SampleLanes<L> {
         let (zero, one) = (u.all(0.0), u.all(1.0));
-        let (p, rough) = (self.probability, self.rough());
-        let is_coat = lobe.lt(p);
-        let mut wi = warp::cosine_hemisphere([u, v]);
-        if (is_coat & rough & self.exists).any() {
-            let reflected = Ggx::new(self.alpha).sample_reflection(wo, [u, v]);
-            wi = vector::select(is_coat & rough, reflected, wi);
+        let (p, rough, is_coat) = (self.probability, self.rough(), lobe.lt(self.probability));
+        let delta = is_coat & !rough;
+        let mut sample = SampleLanes::mirrored(wo, [zero; 3], p);
+        if (delta & self.exists).any() {
+            sample.weight = divide(self.reflectance(wo[2]), p);
         }
-        let (base, value, mut pdf) = self.evaluate(tables, wo, wi);
-        let mut weight = divide(value, pdf);
-        let mut exists = self.exists & zero.lt(pdf);
-        let smooth = !rough & self.exists;
-        let delta = smooth & is_coat;
-        if smooth.any() {
-            // D, the cosine and π cancel.
-            weight = vector::select(smooth, divide(base, one - p), weight);
-            pdf = ((one - p) * wi[2] * zero.all(FRAC_1_PI)).select(smooth, pdf);
-            wi = vector::select(delta, [-wo[0], -wo[1], wo[2]], wi);
-            weight = vector::select(delta, divide(self.reflectance(wo[2]), p), weight);
-            pdf = zero.all(f32::INFINITY).select(delta, pdf);
-            exists = exists | smooth & zero.lt(wi[2]);
+        if (!delta & self.exists).any() {
+            let wi = self.direction(is_coat & rough & self.exists, wo, [u, v]);
+            let reflected = self.reflected(tables, wi);
+            let (mut weight, mut pdf) = (reflected, (one - p) * wi[2] * zero.all(FRAC_1_PI));
+            let mut exists = zero.lt(wi[2]);
+            if rough.any() {
+                let (value, density) = self.both(reflected, wo, wi);
+                weight = vector::select(rough, divide(value, density), weight);
+                pdf = density.select(rough, pdf);
+                exists = exists & (!rough | zero.lt(density));
+            }
+            if (!rough).any() {
+                // Under a smooth coat D, the cosine and π cancel.
+                weight = vector::select(rough, weight, divide(reflected, one - p));
+            }
+            let wide = SampleLanes { direction: wi, weight, pdf, eta: one, exists, delta: one.lt(zero) };
+            sample = sample.select(delta, wide);
         }
-        SampleLanes { direction: wi, weight, pdf, exists, delta }
-    }
-}
-
-/// Samples over lanes.
-pub(super) struct SampleLanes<L: Lanes> {
-    pub(super) direction: [L; 3],
-    pub(super) weight: [L; 3],
-    pub(super) pdf: L,
-    pub(super) exists: L::Mask,
-    pub(super) delta: L::Mask,
-}
-
-/// Coats of a block over lanes.
-#[inline(always)]
-pub(super) fn coats<F: Load>(from: F, coats: &CoatBlock) -> CoatLanes<F::Lanes> {
-    CoatLanes {
-        base: from.row3(&coats.base),
-        tint: from.row3(&coats.tint),
-        metal: from.row3(&coats.metal),
-        metallic: from.row(&coats.metallic),
-        alpha: from.row(&coats.alpha),
-        eta: from.row(&coats.eta),
-        mean: from.row3(&coats.mean),
-        base_weight: from.row(&coats.base_weight),
-        exists: from.set(coats.exists),
-        dielectric: from.set(coats.dielectric),
-        transmittance: from.row3(&coats.transmittance),
-        probability: from.row(&coats.probability),
-    }
-}
-
-impl CoatBlock {
-    /// Computes the parts that depend on the viewers of `surface`, by the instructions of `level`.
-    pub fn see(&mut self, level: Level, surface: &SurfaceBlock, tables: &CoatTables) {
-        level.dispatch(SeeKernel(self, surface, tables));
-    }
-
-    /// Scalar reference; equals [`CoatBlock::see`] to the bit where coats exist.
-    pub fn see_reference(&mut self, surface: &SurfaceBlock, tables: &CoatTables) {
-        for i in 0..super::BLOCK {
-            let [.., c] = viewer(One(i).row3(&surface.wo));
-            let (transmittance, probability) = coats(One(i), self).see(tables, c);
-            put(&mut self.transmittance, i, transmittance);
-            self.probability[i] = probability;
-        }
-    }
-}
-
-struct SeeKernel<'k>(&'k mut CoatBlock, &'k SurfaceBlock, &'k CoatTables);
-
-impl Kernel for SeeKernel<'_> {
-    type Out = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let Self(block, surface, tables) = self;
-        let [.., c] = viewer(All(simd).row3(&surface.wo));
-        let (transmittance, probability) = coats(All(simd), block).see(tables, c);
-        (block.transmittance, block.probability) = (vector::to_arrays(transmittance), probability.to_array());
+        SampleLanes { exists: sample.exists & self.exists, delta: delta & self.exists, ..sample }
     }
 }
 
@@ -281,40 +368,21 @@ pub struct CoatLight<'b> {
 }
 
 impl CoatLight<'_> {
-    /// f |cos| and densities over lanes.
-    #[inline(always)]
-    fn at<F: Load>(&self, from: F) -> ([F::Lanes; 3], F::Lanes) {
-        let Self { surface, coats: block, tables, direction } = self;
-        let wi = to_local(frame(from, surface), from.row3(direction));
-        let (_, f, density) = coats(from, block).evaluate(tables, viewer(from.row3(&surface.wo)), wi);
-        (f, density)
-    }
-
     /// f |cos| and densities by the instructions of `level`, into the lanes of coats.
     pub fn compute(&self, level: Level, value: &mut Row3, pdf: &mut Row) {
-        level.dispatch(LightKernel(self, value, pdf));
-    }
-
-    /// Scalar reference; equals [`CoatLight::compute`] to the bit.
-    pub fn reference(&self, value: &mut Row3, pdf: &mut Row) {
-        for i in (0..super::BLOCK).filter(|i| self.coats.exists >> i & 1 == 1) {
-            let (f, density) = self.at(One(i));
-            put(value, i, f);
-            pdf[i] = density;
-        }
+        level.dispatch((self, value, pdf));
     }
 }
 
-struct LightKernel<'k, 'b>(&'k CoatLight<'b>, &'k mut Row3, &'k mut Row);
-
-impl Kernel for LightKernel<'_, '_> {
+impl Kernel for (&CoatLight<'_>, &mut Row3, &mut Row) {
     type Out = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self(light, value, pdf) = self;
-        let (f, density) = light.at(All(simd));
-        let exists = simd.mask16(light.coats.exists);
+        let (CoatLight { surface, coats, tables, direction }, value, pdf) = self;
+        let [wo, wi] = local(simd, surface, direction);
+        let (coats, exists) = (coats.lanes(simd, coats.exists), simd.mask16(coats.exists));
+        let (f, density) = coats.evaluate(tables, wo, wi);
         *value = vector::to_arrays(vector::select(exists, f, load3(simd, value)));
         *pdf = density.select(exists, simd.load16(pdf)).to_array();
     }
@@ -335,50 +403,46 @@ pub struct CoatSamples<'b> {
     pub lobe: &'b Row,
 }
 
+/// Sets of samples of coats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CoatSets {
+    /// Bit `i`: there is a sample.
+    pub exists: u32,
+    /// Bit `i`: it is mirrored.
+    pub delta: u32,
+    /// Bit `i`: it is of the coat; unspecified unless the coat is sampled apart.
+    pub coat: u32,
+}
+
 impl CoatSamples<'_> {
-    /// Samples over lanes.
-    #[inline(always)]
-    fn at<F: Load>(&self, from: F) -> SampleLanes<F::Lanes> {
-        let Self { surface, coats: block, tables, u, lobe } = self;
-        let u = [from.row(&u[0]), from.row(&u[1]), from.row(lobe)];
-        coats(from, block).sample(tables, viewer(from.row3(&surface.wo)), u)
+    /// Samples by the instructions of `level`, into the lanes of coats.
+    pub fn compute(&self, level: Level, out: &mut ScatterBlock) -> CoatSets {
+        level.dispatch(SampleKernel::<false>(self, out))
     }
 
-    /// Samples by the instructions of `level`, into the lanes of coats. Returns the set of samples, and that
-    /// of mirrored ones.
-    pub fn compute(&self, level: Level, out: &mut ScatterBlock) -> [u32; 2] {
-        level.dispatch(SampleKernel(self, out))
-    }
-
-    /// Scalar reference; equals [`CoatSamples::compute`] to the bit where samples exist.
-    pub fn reference(&self, out: &mut ScatterBlock) -> [u32; 2] {
-        let mut sets = [0; 2];
-        for i in (0..super::BLOCK).filter(|i| self.coats.exists >> i & 1 == 1) {
-            let sample = self.at(One(i));
-            put(&mut out.direction, i, sample.direction);
-            put(&mut out.weight, i, sample.weight);
-            (out.pdf[i], out.eta[i]) = (sample.pdf, 1.0);
-            sets[0] |= u32::from(sample.exists) << i;
-            sets[1] |= u32::from(sample.delta) << i;
-        }
-        sets
+    /// Samples of coats apart from their bases by the instructions of `level`, into their lanes.
+    pub fn compute_apart(&self, level: Level, out: &mut ScatterBlock) -> CoatSets {
+        level.dispatch(SampleKernel::<true>(self, out))
     }
 }
 
-struct SampleKernel<'k, 'b>(&'k CoatSamples<'b>, &'k mut ScatterBlock);
+struct SampleKernel<'k, 'b, const APART: bool>(&'k CoatSamples<'b>, &'k mut ScatterBlock);
 
-impl Kernel for SampleKernel<'_, '_> {
-    type Out = [u32; 2];
+impl<const APART: bool> Kernel for SampleKernel<'_, '_, APART> {
+    type Out = CoatSets;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> [u32; 2] {
-        let Self(samples, out) = self;
-        let (sample, exists) = (samples.at(All(simd)), simd.mask16(samples.coats.exists));
-        let (direction, weight) = (load3(simd, &out.direction), load3(simd, &out.weight));
-        out.direction = vector::to_arrays(vector::select(exists, sample.direction, direction));
-        out.weight = vector::to_arrays(vector::select(exists, sample.weight, weight));
-        out.pdf = sample.pdf.select(exists, simd.load16(&out.pdf)).to_array();
-        out.eta = simd.splat16(1.0).select(exists, simd.load16(&out.eta)).to_array();
-        [sample.exists.bits(), sample.delta.bits()]
+    fn run<S: Simd>(self, simd: S) -> CoatSets {
+        let Self(CoatSamples { surface, coats, tables, u, lobe }, out) = self;
+        let set = if APART { coats.apart } else { coats.exists };
+        let (coats, wo) = (coats.lanes(simd, set), viewer(load3(simd, &surface.wo)));
+        let [u, v] = load2(simd, u);
+        let u = [u, v, simd.load16(lobe)];
+        let (sample, is_coat) = match APART {
+            true => coats.sample_apart(tables, wo, u),
+            false => (coats.sample(tables, wo, u), coats.exists),
+        };
+        out.set(simd, coats.exists, &sample);
+        CoatSets { exists: sample.exists.bits(), delta: sample.delta.bits(), coat: is_coat.bits() }
     }
 }
