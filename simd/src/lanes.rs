@@ -1,8 +1,8 @@
 //! Traits of lanes: the operations that the kernels use, and the token that makes lanes.
 //!
 //! The arithmetic neither fuses nor reduces: each lane computes the scalar operation, to the bit, on every
-//! level, so that a kernel gives the same result everywhere. A single f32 also implements lanes, so that a
-//! kernel of pure arithmetic is its own scalar reference.
+//! level, so that a kernel gives the same result everywhere. A single f32 also implements lanes, by which
+//! the core shades single vertices.
 
 use crate::half;
 use crate::stack::Stack;
