@@ -66,6 +66,15 @@ fn check_records<const N: usize>(what: &str, set: u32, a: &[[f32; N]; 16], b: &[
     }
 }
 
+/// Result of a kernel at a level and by single lanes, written to copies of `empty`.
+fn both<T: Clone>(level: Level, empty: T, compute: impl Fn(Level, &mut T)) -> [T; 2] {
+    [level, Level::SCALAR].map(|level| {
+        let mut out = empty.clone();
+        compute(level, &mut out);
+        out
+    })
+}
+
 fn attempt(input: &mut Unstructured) -> Result<()> {
     let mut rows = Rows { numbers: [0.0; 64], next: 0 };
     for number in &mut rows.numbers {
@@ -183,8 +192,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     check_textures(&mut rows, flags);
     check_choices(&mut rows);
     for level in Level::detect().and_below() {
-        let mut found = SurfaceBlock::EMPTY;
-        surfaces.compute(level, &mut found);
+        let [found, _] = both(level, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block));
         assert_eq!(found.regular, surface.regular, "{level:?}");
         let set = surface.regular;
         check("position", set, &found.position, &surface.position);
@@ -199,16 +207,12 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         check("direction", wanted.exists, &found.direction, &wanted.direction);
         check("density", wanted.exists, &[found.pdf], &[wanted.pdf]);
 
-        let (mut found, mut wanted) = (ShadowBlock::EMPTY, ShadowBlock::EMPTY);
-        direct.compute(Level::SCALAR, &mut wanted);
-        direct.compute(level, &mut found);
+        let [found, wanted] = both(level, ShadowBlock::EMPTY, |level, block| direct.compute(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check_records("shadow ray", wanted.exists, &found.rays, &wanted.rays);
         check_records("contribution", wanted.exists, &found.contribution, &wanted.contribution);
 
-        let (mut found, mut wanted) = (ShadowBlock::EMPTY, ShadowBlock::EMPTY);
-        direct.reach(Level::SCALAR, &mut wanted);
-        direct.reach(level, &mut found);
+        let [found, wanted] = both(level, ShadowBlock::EMPTY, |level, block| direct.reach(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check_records("ray to a light", wanted.exists, &found.rays, &wanted.rays);
         check_records("value", wanted.exists, &found.contribution, &wanted.contribution);
@@ -219,34 +223,34 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         check("sampled weight", set, &found.weight, &wanted.weight);
         check("sampled density", set, &[found.pdf], &[wanted.pdf]);
 
-        let (mut found, mut wanted) = (NextBlock::EMPTY, NextBlock::EMPTY);
-        scatter.compute(Level::SCALAR, &mut wanted);
-        scatter.compute(level, &mut found);
+        let [found, wanted] = both(level, NextBlock::EMPTY, |level, block| scatter.compute(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check_records("ray", wanted.exists, &found.rays, &wanted.rays);
         check("local direction", wanted.exists, &found.local, &wanted.local);
         check_records("state", wanted.exists, &found.states, &wanted.states);
 
-        let mut found = VertexNumbers::EMPTY;
+        let (mut found, mut lights) = (VertexNumbers::EMPTY, VertexNumbers::EMPTY);
         samples.vertices(level, offsets, true, &mut found);
-        for i in 0..16 {
-            let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
-            let index = samples.index[i].reverse_bits();
-            let of = |row: &[Row; 2]| [row[0][i], row[1][i]];
-            assert_eq!(of(&found.light), pair(key, index, first + offsets.light), "{level:?}");
-            assert_eq!(of(&found.scatter), pair(key, index, first + offsets.scatter), "{level:?}");
-            assert_eq!(found.roulette[i], single(key, index, first + offsets.roulette), "{level:?}");
-            assert_eq!(found.choice[i], single(key, index, first + offsets.choice), "{level:?}");
-        }
-        let mut lights = VertexNumbers::EMPTY;
+        check_numbers(&samples, offsets, &found);
         samples.lights(level, offsets, &mut lights);
         assert_eq!((lights.light, lights.choice), (found.light, found.choice), "{level:?}");
-        let (mut found, mut wanted) = ([[0.0; 8]; 16], [[0.0; 8]; 16]);
-        camera.compute(level, &mut found);
-        camera.compute(Level::SCALAR, &mut wanted);
+        let [found, wanted] = both(level, [[0.0; 8]; 16], |level, rays| camera.compute(level, rays));
         check_records("camera ray", 0xffff, &found, &wanted);
     }
     Ok(())
+}
+
+/// Numbers of the vertices against those of single samples.
+fn check_numbers(samples: &SampleBlock, offsets: Offsets, found: &VertexNumbers) {
+    for i in 0..16 {
+        let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());
+        let first = samples.dimension[i];
+        let of = |row: &[Row; 2]| [row[0][i], row[1][i]];
+        assert_eq!(of(&found.light), pair(key, index, first + offsets.light));
+        assert_eq!(of(&found.scatter), pair(key, index, first + offsets.scatter));
+        assert_eq!(found.roulette[i], single(key, index, first + offsets.roulette));
+        assert_eq!(found.choice[i], single(key, index, first + offsets.choice));
+    }
 }
 
 /// Samples of the environment at every level against single lanes.
@@ -277,11 +281,8 @@ fn check_choices(rows: &mut Rows) {
     let weights = core::array::from_fn(|i| columns.map(|column| column[i]));
     let u = rows.unit();
     let choices = Choices { weights: &weights, u: &u };
-    let mut wanted = ChoiceBlock::EMPTY;
-    choices.compute(Level::SCALAR, &mut wanted);
     for level in Level::detect().and_below() {
-        let mut found = ChoiceBlock::EMPTY;
-        choices.compute(level, &mut found);
+        let [found, wanted] = both(level, ChoiceBlock::EMPTY, |level, block| choices.compute(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check("group", wanted.exists, &[found.group], &[wanted.group]);
         check("probability", wanted.exists, &[found.probability], &[wanted.probability]);
@@ -350,12 +351,11 @@ fn check_apart(rows: &mut Rows, [alone, balance]: [u32; 2], surface: &SurfaceBlo
     let (each, throughput, supplied) = (&each, &throughput, balance);
     let light = ApartLight { surface, coats, tables, light: &light, each, throughput, supplied };
     let samples = CoatSamples { surface, coats, tables, u: &u, lobe: &lobe };
-    let (mut lit, mut wanted) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
-    light.compute(Level::SCALAR, &mut lit);
+    let mut wanted = ScatterBlock::EMPTY;
     let sets = samples.compute_apart(Level::SCALAR, &mut wanted);
     for level in Level::detect().and_below() {
-        let (mut found, mut out) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
-        light.compute(level, &mut found);
+        let [found, lit] = both(level, ApartBlock::EMPTY, |level, block| light.compute(level, block));
+        let mut out = ScatterBlock::EMPTY;
         assert_eq!(samples.compute_apart(level, &mut out), sets, "{level:?}");
         check("value", coats.apart, &found.value, &lit.value);
         check("contribution", coats.apart, &found.contribution, &lit.contribution);

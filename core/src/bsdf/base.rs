@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use halflight_simd::kernels::shade::bsdf::viewer;
-use halflight_simd::kernels::shade::coat::CoatLanes;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
 /// Largest alpha of a coat whose transmittance follows the fit, and largest reflectance at normal incidence
 /// of a coat of Schlick that does at any alpha.

@@ -5,7 +5,7 @@ use super::{All, Bsdf, BsdfSample, COATS, Features};
 use crate::Rgb;
 use glam::Vec3;
 use halflight_simd::kernels::shade::bsdf::viewer;
-use halflight_simd::kernels::shade::coat::CoatLanes;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
 /// BSDF for a fixed viewer, with everything precomputed that does not depend on the light.
 #[derive(Clone, Copy)]
@@ -91,8 +91,8 @@ impl Bsdf {
         }
     }
 
-    /// True for a coat, rough or smooth, whose peak is brighter than a quarter of a white diffuse surface (1 /
-    /// π). At normal incidence the peak of GGX is F / (4 π α²).
+    /// True for a coat, rough or smooth, whose peak is brighter than a quarter of a white diffuse surface
+    /// (1 / π). At normal incidence the peak of GGX is F / (4 π α²).
     #[inline]
     pub(crate) fn has_narrow_coat(&self) -> bool {
         let is_narrow =

@@ -10,7 +10,7 @@ use super::CoatTransmittance;
 use super::albedo::{self, SchlickFit, schlick_albedo_fit};
 use super::range::unit;
 use crate::Rgb;
-use halflight_simd::kernels::shade::coat::CoatLanes;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
 /// Coat over a base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,5 @@
-//! BSDF at a point: one file per model behind the closed enum [`Bsdf`].
+//! BSDF at a point: parameters of the models behind the closed enum [`Bsdf`]. Their formulas are functions
+//! over lanes ([`halflight_simd::kernels::shade`]), called with f32 as a lane.
 //!
 //! Directions are local and point away from the surface: z is the shading normal on the side of the viewer,
 //! `wo` points to the viewer and `wi` to the origin of the light. Transmission is that of radiance and

@@ -12,7 +12,7 @@ use super::albedo::{self, SchlickFit};
 use super::fresnel;
 use super::range::{MAX_INDEX, unit};
 use crate::Rgb;
-use halflight_simd::kernels::shade::coat::CoatLanes;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
 /// Dielectric coat over a diffuse base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -18,8 +18,8 @@ pub struct Mirror {
     pub reflectance: Rgb,
 }
 
-/// Metal: GGX microfacets with Schlick's Fresnel term, a coloured mirror if smooth. Light that bounces between
-/// microfacets is lost, as usual in single-scattering models.
+/// Metal: GGX microfacets with Schlick's Fresnel term, a coloured mirror if smooth. Light that bounces
+/// between microfacets is lost, as usual in single-scattering models.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
     /// Reflectance at normal incidence, 0 … 1.

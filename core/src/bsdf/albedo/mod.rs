@@ -34,8 +34,8 @@ pub(crate) static COATS: CoatTables = {
     tables
 };
 
-/// Cosine-weighted mean over the hemisphere of the albedo of a coat with Schlick's reflectance: for F = 1, and
-/// for F = (1 - c)^5. For any F0 it is F0 · (white - edge) + edge.
+/// Cosine-weighted mean over the hemisphere of the albedo of a coat with Schlick's reflectance: `white` for
+/// F = 1, `edge` for F = (1 - c)^5. For any F0 it is F0 · (white - edge) + edge.
 #[inline]
 pub(super) fn schlick_mean(alpha: f32) -> [f32; 2] {
     /// Mean of (1 - c)^5.

@@ -1,8 +1,9 @@
-//! Coats apart from their bases, over lanes, where a data structure supplies light of the bases: a sample is of
-//! the base or of the coat alone, and light samples of each are weighted against its own density.
+//! Coats apart from their bases, over lanes, where a data structure supplies light of the bases: a sample is
+//! of the base or of the coat alone, and light samples of each are weighted against its own density.
 
 use super::bsdf::{SampleLanes, local};
-use super::coat::{CoatBlock, CoatLanes};
+use super::coat::CoatBlock;
+use super::coat_lanes::CoatLanes;
 use super::coat_tables::CoatTables;
 use super::direct::{LightBlock, LightLanes};
 use super::surface::SurfaceBlock;

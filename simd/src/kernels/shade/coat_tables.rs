@@ -45,8 +45,8 @@ fn place<L: Lanes>(x: L, nodes: usize) -> [L; 2] {
     [below, at - below]
 }
 
-/// Position of `alpha` among the roughnesses. The differences grow as alpha², the fourth power of the axis, and
-/// so does the interpolation between the smooth coat and the first node.
+/// Position of `alpha` among the roughnesses. The differences grow as alpha², the fourth power of the axis,
+/// and so does the interpolation between the smooth coat and the first node.
 #[inline(always)]
 pub fn roughness<L: Lanes>(alpha: L) -> [L; 2] {
     let [row, t] = place(alpha.sqrt(), ROUGHNESSES);

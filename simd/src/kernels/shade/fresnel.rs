@@ -12,8 +12,8 @@ pub fn dielectric<L: Lanes>(c: L, eta: L) -> L {
     between(c, g2.sqrt(), eta).select(zero.lt(g2), one)
 }
 
-/// g² = (eta cos θ_t)², below zero at total reflection. (eta - 1)(eta + 1) keeps the digits that eta² - 1 loses
-/// near 1.
+/// g² = (eta cos θ_t)², below zero at total reflection. (eta - 1)(eta + 1) keeps the digits that eta² - 1
+/// loses near 1.
 #[inline(always)]
 fn square_g<L: Lanes>(c: L, eta: L) -> L {
     let one = c.all(1.0);

@@ -1,14 +1,16 @@
 //! Shading of blocks of sixteen vertices, in structures of arrays: random numbers, surface points, samples of
 //! area lights, choices among groups of lights, BSDFs, and camera rays.
 //!
-//! A formula is a function over lanes, which one f32 implements as well: the core shades single vertices by it,
-//! and every level gives the same bits. Lanes without a vertex hold any values; their results are ignored.
+//! A formula is a function over lanes, which one f32 implements as well: the core shades single vertices by
+//! it, and every level gives the same bits. Lanes without a vertex hold any values; their results are not
+//! used.
 
 pub mod bsdf;
 pub mod camera;
 pub mod choice;
 pub mod coat;
 pub mod coat_apart;
+pub mod coat_lanes;
 pub mod coat_tables;
 pub mod direct;
 pub mod emitter;

@@ -53,6 +53,12 @@ impl Random {
     }
 }
 
+/// Result of a kernel at `level`, written to `out`.
+fn by<T>(level: Level, mut out: T, compute: impl Fn(Level, &mut T)) -> T {
+    compute(level, &mut out);
+    out
+}
+
 fn bits3(rows: &Row3, i: usize) -> [u32; 3] {
     at(rows, i).map(f32::to_bits)
 }
@@ -104,11 +110,9 @@ fn surface_points_are_the_same_on_every_level() {
         });
         let normals = (round % 2 == 0).then_some(&normals);
         let surfaces = Surfaces { corners: &corners, normals, weights: &weights, rays: &rays };
-        let mut wanted = SurfaceBlock::EMPTY;
-        surfaces.compute(Level::SCALAR, &mut wanted);
+        let wanted = by(Level::SCALAR, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block));
         for level in Level::detect().and_below() {
-            let mut found = SurfaceBlock::EMPTY;
-            surfaces.compute(level, &mut found);
+            let found = by(level, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block));
             assert_eq!((found.front, found.regular), (wanted.front, wanted.regular), "{level:?}");
             for i in lanes(wanted.regular) {
                 let all = |block: &super::surface::SurfaceBlock| {
@@ -206,16 +210,14 @@ fn scattering_is_the_same_on_every_level() {
             active: random.bits() & surface.regular,
             certain: random.bits() & random.bits(),
         };
-        let (mut lit, mut reached, mut next) = (ShadowBlock::EMPTY, ShadowBlock::EMPTY, NextBlock::EMPTY);
-        direct.compute(Level::SCALAR, &mut lit);
-        direct.reach(Level::SCALAR, &mut reached);
-        scatter.compute(Level::SCALAR, &mut next);
+        let lit = by(Level::SCALAR, ShadowBlock::EMPTY, |level, block| direct.compute(level, block));
+        let reached = by(Level::SCALAR, ShadowBlock::EMPTY, |level, block| direct.reach(level, block));
+        let next = by(Level::SCALAR, NextBlock::EMPTY, |level, block| scatter.compute(level, block));
         let samples = scatter.samples(Level::SCALAR);
         shadows += lit.exists.count_ones();
         rays += next.exists.count_ones();
         for level in Level::detect().and_below() {
-            let mut found = ShadowBlock::EMPTY;
-            direct.reach(level, &mut found);
+            let found = by(level, ShadowBlock::EMPTY, |level, block| direct.reach(level, block));
             assert_eq!(found.exists, reached.exists, "{level:?}");
             for i in lanes(reached.exists) {
                 assert_eq!(found.rays[i].map(f32::to_bits), lit.rays[i].map(f32::to_bits), "{level:?}");
@@ -229,16 +231,14 @@ fn scattering_is_the_same_on_every_level() {
                 };
                 assert_eq!(of(&found), of(&samples.0), "{level:?}");
             }
-            let mut found = ShadowBlock::EMPTY;
-            direct.compute(level, &mut found);
+            let found = by(level, ShadowBlock::EMPTY, |level, block| direct.compute(level, block));
             assert_eq!(found.exists, lit.exists, "{level:?}");
             for i in lanes(lit.exists) {
                 assert_eq!(found.rays[i].map(f32::to_bits), lit.rays[i].map(f32::to_bits), "{level:?}");
                 let contributions = [found.contribution[i], lit.contribution[i]];
                 assert_eq!(contributions[0], contributions[1], "{level:?}");
             }
-            let mut found = NextBlock::EMPTY;
-            scatter.compute(level, &mut found);
+            let found = by(level, NextBlock::EMPTY, |level, block| scatter.compute(level, block));
             assert_eq!(found.exists, next.exists, "{level:?}");
             for i in lanes(next.exists) {
                 assert_eq!(found.rays[i].map(f32::to_bits), next.rays[i].map(f32::to_bits), "{level:?}");
@@ -260,10 +260,8 @@ fn seen(random: &mut Random) -> SurfaceBlock {
         let [x, y, z] = at(&directions, i);
         [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
     });
-    let mut surface = SurfaceBlock::EMPTY;
-    Surfaces { corners: &corners, normals: None, weights: &weights, rays: &views }
-        .compute(Level::SCALAR, &mut surface);
-    surface
+    let surfaces = Surfaces { corners: &corners, normals: None, weights: &weights, rays: &views };
+    by(Level::SCALAR, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block))
 }
 
 /// Coats of both kinds, rough and smooth, of which a part has no base.
@@ -392,8 +390,7 @@ fn coats_apart_are_the_same_on_every_level() {
             *count += (set & surface.regular).count_ones() as usize;
         }
         for level in Level::detect().and_below() {
-            let mut found = ApartBlock::EMPTY;
-            light.compute(level, &mut found);
+            let found = by(level, ApartBlock::EMPTY, |level, block| light.compute(level, block));
             for i in lanes(set) {
                 let all = |of: &ApartBlock| [&of.value, &of.contribution, &of.base].map(|row| bits3(row, i));
                 assert_eq!(all(&found), all(&lit), "{level:?} {i}");
@@ -402,8 +399,7 @@ fn coats_apart_are_the_same_on_every_level() {
             let found_sets = samples.compute_apart(level, &mut found);
             let all = |sets: &CoatSets| [sets.exists, sets.delta, sets.coat].map(|bits| bits & set);
             assert_eq!(all(&found_sets), all(&sets), "{level:?}");
-            let beyond = found_sets.exists | found_sets.delta | found_sets.coat;
-            assert_eq!(beyond & !coats.apart, 0, "{level:?}");
+            assert_eq!((found_sets.exists | found_sets.delta | found_sets.coat) & !coats.apart, 0);
             check_samples(&found, &wanted, &before, [sets.exists & set, coats.apart]);
         }
     }
@@ -524,11 +520,9 @@ fn camera_rays_are_the_same_on_every_level() {
             .map(|d| [d[0][0], d[1][0], d[2][0]]);
         let rays =
             CameraRays { eye: [1.0, -2.0, 3.0], axes, pixel: 0.002, half: [320.0, 240.0], raster: &raster };
-        let mut wanted = [[0.0; 8]; 16];
-        rays.compute(Level::SCALAR, &mut wanted);
+        let wanted = by(Level::SCALAR, [[0.0; 8]; 16], |level, out| rays.compute(level, out));
         for level in Level::detect().and_below() {
-            let mut found = [[0.0; 8]; 16];
-            rays.compute(level, &mut found);
+            let found = by(level, [[0.0; 8]; 16], |level, out| rays.compute(level, out));
             assert_eq!(found, wanted, "{level:?}");
         }
     }

@@ -1,5 +1,5 @@
-//! Warps of the unit square, and the trigonometry that they need, over lanes: polynomials with the same bits on
-//! every target, several times faster than general routines.
+//! Warps of the unit square, and the trigonometry that they need, over lanes: polynomials with the same bits
+//! on every target, several times faster than general routines.
 
 use super::vector;
 use crate::lanes::Lanes;
@@ -69,8 +69,8 @@ pub fn concentric_disk<L: Lanes>(u: [L; 2]) -> [L; 2] {
     [zero.select(is_center, sin.select(steep, cos)), zero.select(is_center, cos.select(steep, sin))]
 }
 
-/// Direction of the upper hemisphere with density cos θ / π. Never on the horizon, where the density is zero: z²
-/// is at least the rounding of 1 - x² - y².
+/// Direction of the upper hemisphere with density cos θ / π. Never on the horizon, where the density is zero:
+/// z² is at least the rounding of 1 - x² - y².
 #[inline(always)]
 pub fn cosine_hemisphere<L: Lanes>(u: [L; 2]) -> [L; 3] {
     let [x, y] = concentric_disk(u);

@@ -109,16 +109,14 @@ impl Block {
             let length = (x * x + y * y + z * z).sqrt();
             [0.0, 1.0, 0.0, f32::INFINITY, x / length, y / length, z / length, 0.0]
         });
-        let mut surface = SurfaceBlock::EMPTY;
+        let (mut surface, mut numbers) = (SurfaceBlock::EMPTY, VertexNumbers::EMPTY);
         Surfaces { corners: &corners, normals: None, weights: &weights, rays: &rays }
             .compute(Level::BASELINE, &mut surface);
         let mut samples = SampleBlock::EMPTY;
         for i in 0..16 {
-            samples.place[i] = seed << 8 | i as u64;
-            samples.index[i] = seed as u32;
-            samples.dimension[i] = 7;
+            (samples.place[i], samples.index[i], samples.dimension[i]) =
+                (seed << 8 | i as u64, seed as u32, 7);
         }
-        let mut numbers = VertexNumbers::EMPTY;
         samples.vertices(Level::BASELINE, OFFSETS, true, &mut numbers);
         // A square lamp of side 1 at the height 2, which shines downwards.
         let mut lights = EmitterBlock::EMPTY;
