@@ -49,9 +49,9 @@ fn sums(input: &mut Unstructured) -> Result<()> {
     }
     let weights = &table[..groups.min(table.len())];
     let mut wanted = vec![[[0.5; 16]; 3]; groups];
-    Outer { factors: &factors, table: &table, sums: &mut wanted }.reference();
+    Outer { factors: &factors, table: &table, sums: &mut wanted }.add(Level::SCALAR);
     let mut dots = [7.0; 4];
-    Dots { rows: &halves, weights, out: &mut dots }.reference();
+    Dots { rows: &halves, weights, out: &mut dots }.compute(Level::SCALAR);
     for level in Level::detect().and_below() {
         let mut found = vec![[[0.5; 16]; 3]; groups];
         Outer { factors: &factors, table: &table, sums: &mut found }.add(level);

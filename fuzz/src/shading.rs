@@ -1,4 +1,4 @@
-//! Shading kernels at every level against their scalar references, in the lanes that exist, to the bit.
+//! Shading kernels at every level against single f32 lanes, in the lanes that exist, to the bit.
 
 use crate::numbers::coordinate;
 use arbitrary::{Result, Unstructured};
@@ -6,12 +6,12 @@ use halflight_simd::Level;
 use halflight_simd::kernels::shade::bsdf::BsdfBlock;
 use halflight_simd::kernels::shade::camera::CameraRays;
 use halflight_simd::kernels::shade::choice::{ChoiceBlock, Choices};
-use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples};
+use halflight_simd::kernels::shade::coat::{CoatBlock, CoatLight, CoatSamples, CoatSets};
 use halflight_simd::kernels::shade::coat_apart::{ApartBlock, ApartLight};
 use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSamples};
-use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
+use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers, pair, place_key, single};
 use halflight_simd::kernels::shade::rough::{Rough, RoughBlock};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
@@ -66,6 +66,15 @@ fn check_records<const N: usize>(what: &str, set: u32, a: &[[f32; N]; 16], b: &[
     }
 }
 
+/// Result of a kernel at a level and by single lanes, written to copies of `empty`.
+fn both<T: Clone>(level: Level, empty: T, compute: impl Fn(Level, &mut T)) -> [T; 2] {
+    [level, Level::SCALAR].map(|level| {
+        let mut out = empty.clone();
+        compute(level, &mut out);
+        out
+    })
+}
+
 fn attempt(input: &mut Unstructured) -> Result<()> {
     let mut rows = Rows { numbers: [0.0; 64], next: 0 };
     for number in &mut rows.numbers {
@@ -80,7 +89,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     views.as_flattened_mut().iter_mut().zip(rows.numbers.iter().cycle()).for_each(|(x, y)| *x = *y);
     let normals = (flags & 1 == 0).then_some(&normals);
     let surfaces = Surfaces { corners: &corners, normals, weights: &weights, rays: &views };
-    let surface = surfaces.reference();
+    let mut surface = SurfaceBlock::EMPTY;
+    surfaces.compute(Level::SCALAR, &mut surface);
     let lights = EmitterBlock {
         origin: rows.vectors(),
         edges: [rows.vectors(), rows.vectors()],
@@ -182,8 +192,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     check_textures(&mut rows, flags);
     check_choices(&mut rows);
     for level in Level::detect().and_below() {
-        let mut found = SurfaceBlock::EMPTY;
-        surfaces.compute(level, &mut found);
+        let [found, _] = both(level, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block));
         assert_eq!(found.regular, surface.regular, "{level:?}");
         let set = surface.regular;
         check("position", set, &found.position, &surface.position);
@@ -192,51 +201,59 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         check("viewer", set, &found.wo, &surface.wo);
         check("error", set, &[found.error], &[surface.error]);
 
-        let (found, wanted) = (emitters.compute(level), emitters.reference());
+        let (found, wanted) = (emitters.compute(level), emitters.compute(Level::SCALAR));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check("end", wanted.exists, &found.end, &wanted.end);
         check("direction", wanted.exists, &found.direction, &wanted.direction);
         check("density", wanted.exists, &[found.pdf], &[wanted.pdf]);
 
-        let (mut found, wanted) = (ShadowBlock::EMPTY, direct.reference());
-        direct.compute(level, &mut found);
+        let [found, wanted] = both(level, ShadowBlock::EMPTY, |level, block| direct.compute(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check_records("shadow ray", wanted.exists, &found.rays, &wanted.rays);
         check_records("contribution", wanted.exists, &found.contribution, &wanted.contribution);
 
-        let (mut found, wanted) = (ShadowBlock::EMPTY, direct.reach_reference());
-        direct.reach(level, &mut found);
+        let [found, wanted] = both(level, ShadowBlock::EMPTY, |level, block| direct.reach(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check_records("ray to a light", wanted.exists, &found.rays, &wanted.rays);
         check_records("value", wanted.exists, &found.contribution, &wanted.contribution);
 
-        let ((found, exists), (wanted, set)) = (scatter.samples(level), scatter.samples_reference());
+        let ((found, exists), (wanted, set)) = (scatter.samples(level), scatter.samples(Level::SCALAR));
         assert_eq!(exists, set, "{level:?}");
         check("sampled direction", set, &found.direction, &wanted.direction);
         check("sampled weight", set, &found.weight, &wanted.weight);
         check("sampled density", set, &[found.pdf], &[wanted.pdf]);
 
-        let (mut found, wanted) = (NextBlock::EMPTY, scatter.reference());
-        scatter.compute(level, &mut found);
+        let [found, wanted] = both(level, NextBlock::EMPTY, |level, block| scatter.compute(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check_records("ray", wanted.exists, &found.rays, &wanted.rays);
         check("local direction", wanted.exists, &found.local, &wanted.local);
         check_records("state", wanted.exists, &found.states, &wanted.states);
 
-        let mut found = VertexNumbers::EMPTY;
+        let (mut found, mut lights) = (VertexNumbers::EMPTY, VertexNumbers::EMPTY);
         samples.vertices(level, offsets, true, &mut found);
-        assert_eq!(found, samples.reference(offsets, true), "{level:?}");
-        let mut lights = VertexNumbers::EMPTY;
+        check_numbers(&samples, offsets, &found);
         samples.lights(level, offsets, &mut lights);
         assert_eq!((lights.light, lights.choice), (found.light, found.choice), "{level:?}");
-        let mut found = [[0.0; 8]; 16];
-        camera.compute(level, &mut found);
-        check_records("camera ray", 0xffff, &found, &camera.reference());
+        let [found, wanted] = both(level, [[0.0; 8]; 16], |level, rays| camera.compute(level, rays));
+        check_records("camera ray", 0xffff, &found, &wanted);
     }
     Ok(())
 }
 
-/// Samples of the environment at every level against their scalar reference.
+/// Numbers of the vertices against those of single samples.
+fn check_numbers(samples: &SampleBlock, offsets: Offsets, found: &VertexNumbers) {
+    for i in 0..16 {
+        let (key, index) = (place_key(samples.place[i]), samples.index[i].reverse_bits());
+        let first = samples.dimension[i];
+        let of = |row: &[Row; 2]| [row[0][i], row[1][i]];
+        assert_eq!(of(&found.light), pair(key, index, first + offsets.light));
+        assert_eq!(of(&found.scatter), pair(key, index, first + offsets.scatter));
+        assert_eq!(found.roulette[i], single(key, index, first + offsets.roulette));
+        assert_eq!(found.choice[i], single(key, index, first + offsets.choice));
+    }
+}
+
+/// Samples of the environment at every level against single lanes.
 fn check_sky(rows: &mut Rows, active: u32, is_map: bool) {
     let sky = SkyBlock {
         at: [rows.unit(), rows.unit()],
@@ -248,7 +265,7 @@ fn check_sky(rows: &mut Rows, active: u32, is_map: bool) {
     let samples = SkySamples { sky: &sky, to_world: is_map.then_some([x, y, z]), active };
     let before = (rows.vectors(), rows.row());
     let (mut direction, mut pdf) = before;
-    let set = samples.reference(&mut direction, &mut pdf);
+    let set = samples.compute(Level::SCALAR, &mut direction, &mut pdf);
     for level in Level::detect().and_below() {
         let mut found = before;
         assert_eq!(samples.compute(level, &mut found.0, &mut found.1), set, "{level:?}");
@@ -257,17 +274,15 @@ fn check_sky(rows: &mut Rows, active: u32, is_map: bool) {
     }
 }
 
-/// Chosen groups at every level against their scalar reference.
+/// Chosen groups at every level against single lanes.
 fn check_choices(rows: &mut Rows) {
     let weight = |x: f32| if x > 0.0 { x.min(1e30) } else { 0.0 };
     let columns: [Row; 8] = core::array::from_fn(|_| rows.row().map(weight));
     let weights = core::array::from_fn(|i| columns.map(|column| column[i]));
     let u = rows.unit();
     let choices = Choices { weights: &weights, u: &u };
-    let wanted = choices.reference();
     for level in Level::detect().and_below() {
-        let mut found = ChoiceBlock::EMPTY;
-        choices.compute(level, &mut found);
+        let [found, wanted] = both(level, ChoiceBlock::EMPTY, |level, block| choices.compute(level, block));
         assert_eq!(found.exists, wanted.exists, "{level:?}");
         check("group", wanted.exists, &[found.group], &[wanted.group]);
         check("probability", wanted.exists, &[found.probability], &[wanted.probability]);
@@ -275,7 +290,7 @@ fn check_choices(rows: &mut Rows) {
     }
 }
 
-/// Rough dielectrics at every level against their scalar references.
+/// Rough dielectrics at every level against single lanes.
 fn check_rough(rows: &mut Rows, surface: &SurfaceBlock, exists: u32) {
     let eta = rows.unit().map(|x| 0.25 + 2.5 * x);
     let rough =
@@ -283,8 +298,8 @@ fn check_rough(rows: &mut Rows, surface: &SurfaceBlock, exists: u32) {
     let (rough, direction) = (Rough { surface, rough: &rough }, rows.vectors());
     let (u, lobe, before) = ([rows.unit(), rows.unit()], rows.unit(), (rows.vectors(), rows.row()));
     let (mut wanted, mut sampled) = (before, ScatterBlock::EMPTY);
-    rough.light_reference(&direction, &mut wanted.0, &mut wanted.1);
-    let set = rough.sample_reference((&u, &lobe), &mut sampled);
+    rough.light(Level::SCALAR, &direction, &mut wanted.0, &mut wanted.1);
+    let set = rough.sample(Level::SCALAR, (&u, &lobe), &mut sampled);
     for level in Level::detect().and_below() {
         let (mut found, mut out) = (before, ScatterBlock::EMPTY);
         rough.light(level, &direction, &mut found.0, &mut found.1);
@@ -297,7 +312,7 @@ fn check_rough(rows: &mut Rows, surface: &SurfaceBlock, exists: u32) {
     }
 }
 
-/// Texture look-ups at every level against their scalar reference.
+/// Texture look-ups at every level against single lanes.
 fn check_textures(rows: &mut Rows, clamps: u32) {
     let size = |row: Row| row.map(|x| 1.0 + (x * 5000.0).floor());
     let given = TextureBlock {
@@ -308,8 +323,8 @@ fn check_textures(rows: &mut Rows, clamps: u32) {
         ..TextureBlock::EMPTY
     };
     let (mut wanted, mut mixture) = (given.clone(), rows.vectors());
-    wanted.surround_reference();
-    wanted.mix_reference(&mut mixture);
+    wanted.surround(Level::SCALAR);
+    wanted.mix(Level::SCALAR, &mut mixture);
     for level in Level::detect().and_below() {
         let (mut found, mut mixed) = (given.clone(), mixture);
         found.surround(level);
@@ -321,9 +336,9 @@ fn check_textures(rows: &mut Rows, clamps: u32) {
     }
 }
 
-/// Coats apart from their bases at every level against their scalar references.
+/// Coats apart from their bases at every level against single lanes.
 fn check_apart(rows: &mut Rows, [alone, balance]: [u32; 2], surface: &SurfaceBlock, coats: &CoatBlock) {
-    let tables: &CoatTables = &[[[-100; 16]; 12]; 11];
+    let tables: &CoatTables = &[-100; 2112];
     let light = LightBlock {
         direction: rows.vectors(),
         pdf: rows.row(),
@@ -336,12 +351,11 @@ fn check_apart(rows: &mut Rows, [alone, balance]: [u32; 2], surface: &SurfaceBlo
     let (each, throughput, supplied) = (&each, &throughput, balance);
     let light = ApartLight { surface, coats, tables, light: &light, each, throughput, supplied };
     let samples = CoatSamples { surface, coats, tables, u: &u, lobe: &lobe };
-    let (mut lit, mut wanted) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
-    light.reference(&mut lit);
-    let sets = samples.reference_apart(&mut wanted);
+    let mut wanted = ScatterBlock::EMPTY;
+    let sets = samples.compute_apart(Level::SCALAR, &mut wanted);
     for level in Level::detect().and_below() {
-        let (mut found, mut out) = (ApartBlock::EMPTY, ScatterBlock::EMPTY);
-        light.compute(level, &mut found);
+        let [found, lit] = both(level, ApartBlock::EMPTY, |level, block| light.compute(level, block));
+        let mut out = ScatterBlock::EMPTY;
         assert_eq!(samples.compute_apart(level, &mut out), sets, "{level:?}");
         check("value", coats.apart, &found.value, &lit.value);
         check("contribution", coats.apart, &found.contribution, &lit.contribution);
@@ -352,7 +366,7 @@ fn check_apart(rows: &mut Rows, [alone, balance]: [u32; 2], surface: &SurfaceBlo
     }
 }
 
-/// Coats and smooth surfaces at every level against their scalar references.
+/// Coats and smooth surfaces at every level against single lanes.
 fn check_coats(
     rows: &mut Rows,
     seed: i16,
@@ -360,37 +374,23 @@ fn check_coats(
     coats: &CoatBlock,
     specular: &SpecularBlock,
 ) {
-    let mut tables: CoatTables = [[[seed; 16]; 12]; 11];
-    for (i, entry) in tables.as_flattened_mut().as_flattened_mut().iter_mut().enumerate() {
-        *entry = entry.wrapping_mul(i as i16);
-    }
-    let tables = &tables;
+    let tables: &CoatTables = &core::array::from_fn(|i| seed.wrapping_mul(i as i16));
     let (u, lobe, direction) = ([rows.unit(), rows.unit()], rows.unit(), rows.vectors());
     let light = CoatLight { surface, coats, tables, direction: &direction };
     let samples = CoatSamples { surface, coats, tables, u: &u, lobe: &lobe };
     let smooth = SpecularSamples { surface, specular, lobe: &lobe };
     let before = (rows.vectors(), rows.row(), ScatterBlock::EMPTY);
-    let compute = |level: Option<Level>| {
+    let compute = |level: Level| {
         let (mut seen, (mut value, mut pdf, mut out)) = (coats.clone(), before.clone());
-        let sets = match level {
-            None => {
-                seen.see_reference(surface, tables);
-                light.reference(&mut value, &mut pdf);
-                let [exists, delta] = samples.reference(&mut out);
-                [exists, delta, smooth.reference(&mut out)]
-            }
-            Some(level) => {
-                seen.see(level, surface, tables);
-                light.compute(level, &mut value, &mut pdf);
-                let [exists, delta] = samples.compute(level, &mut out);
-                [exists, delta, smooth.compute(level, &mut out)]
-            }
-        };
+        seen.see(level, surface, tables);
+        light.compute(level, &mut value, &mut pdf);
+        let CoatSets { exists, delta, .. } = samples.compute(level, &mut out);
+        let sets = [exists, delta, smooth.compute(level, &mut out)];
         (seen, value, pdf, out, sets)
     };
-    let wanted = compute(None);
+    let wanted = compute(Level::SCALAR);
     for level in Level::detect().and_below() {
-        let found = compute(Some(level));
+        let found = compute(level);
         assert_eq!(found.4, wanted.4, "{level:?}");
         check("transmittance", coats.exists, &found.0.transmittance, &wanted.0.transmittance);
         check("probability", coats.exists, &[found.0.probability], &[wanted.0.probability]);

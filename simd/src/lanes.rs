@@ -1,8 +1,8 @@
 //! Traits of lanes: the operations that the kernels use, and the token that makes lanes.
 //!
 //! The arithmetic neither fuses nor reduces: each lane computes the scalar operation, to the bit, on every
-//! level, so that a kernel gives the same result everywhere. A single f32 also implements lanes, so that a
-//! kernel of pure arithmetic is its own scalar reference.
+//! level, so that a kernel gives the same result everywhere. A single f32 also implements lanes, by which
+//! the core shades single vertices.
 
 use crate::half;
 use crate::stack::Stack;
@@ -59,9 +59,15 @@ where
     fn signs(self) -> u32;
     /// `self` in lanes where `mask` is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
-    /// Entries `i` and `i + 1` of `table`; the lanes are integers `i` of at least 0 and below 2^24. Beyond
+    /// Entries `i` and `i + 1` of `table`; the lanes are integers `i` of at least 0 and below 2^23. Beyond
     /// the end these are the last two entries; zeros if there are fewer.
     fn neighbours(self, table: &[i16]) -> [Self; 2];
+    /// Entries `i` and `i + 1` of `table`, and those `columns` behind them; indices as for
+    /// [`Lanes::neighbours`].
+    #[inline(always)]
+    fn cell(self, table: &[i16], columns: usize) -> [[Self; 2]; 2] {
+        [self.neighbours(table), (self + self.all(columns as f32)).neighbours(table)]
+    }
     /// Largest lane; unspecified with NaN.
     fn largest(self) -> f32;
     /// Smallest lane; unspecified with NaN.
@@ -147,10 +153,12 @@ impl Lanes for f32 {
     }
     #[inline(always)]
     fn neighbours(self, table: &[i16]) -> [Self; 2] {
-        match table.get((self as usize).min(table.len().saturating_sub(2))..) {
-            Some([first, second, ..]) => [f32::from(*first), f32::from(*second)],
-            _ => [0.0; 2],
-        }
+        pair(table, index(self).min(table.len().saturating_sub(2)))
+    }
+    #[inline(always)]
+    fn cell(self, table: &[i16], columns: usize) -> [[Self; 2]; 2] {
+        let i = index(self).min(table.len().saturating_sub(columns + 2));
+        [pair(table, i), pair(table, i + columns)]
     }
     #[inline(always)]
     fn largest(self) -> f32 {
@@ -159,6 +167,21 @@ impl Lanes for f32 {
     #[inline(always)]
     fn to_array(self) -> [f32; 1] {
         [self]
+    }
+}
+
+/// Integer value of a lane below 2^23. From 2^23 to 2^24 the last bit of a float is 1: its bits count.
+#[inline(always)]
+fn index(lane: f32) -> usize {
+    ((lane + 8_388_608.0).to_bits() & 0x7f_ffff) as usize
+}
+
+/// Entries `i` and `i + 1`; zeros beyond the end.
+#[inline(always)]
+fn pair(table: &[i16], i: usize) -> [f32; 2] {
+    match table.get(i..) {
+        Some([first, second, ..]) => [f32::from(*first), f32::from(*second)],
+        _ => [0.0; 2],
     }
 }
 

@@ -7,6 +7,9 @@ use crate::{Baseline, Simd};
 /// Tier of SIMD instructions. A higher tier contains all lower ones.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub enum Tier {
+    /// Single lanes, for tests.
+    #[cfg(any(test, feature = "scalar"))]
+    Scalar,
     /// Instructions of the build target: SSE2, NEON, simd128 or scalar code, through `wide`.
     Baseline,
     /// x86-64-v3: AVX2, FMA, F16C, BMI1/2, LZCNT, MOVBE, POPCNT.
@@ -22,6 +25,8 @@ impl Tier {
     /// Name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
+            #[cfg(any(test, feature = "scalar"))]
+            Tier::Scalar => "scalar",
             Tier::Baseline => "baseline",
             Tier::Avx2 => "avx2",
             Tier::Avx512 => "avx512",
@@ -53,6 +58,10 @@ pub trait Kernel {
 impl Level {
     /// Level that every processor of the build target has.
     pub const BASELINE: Level = Level(Tier::Baseline);
+
+    /// Single lanes, by which tests judge the other levels.
+    #[cfg(any(test, feature = "scalar"))]
+    pub const SCALAR: Level = Level(Tier::Scalar);
 
     /// Highest level of this processor; without the feature `std` the highest that the build target
     /// guarantees.
@@ -92,13 +101,17 @@ impl Level {
     /// Runs `kernel` compiled for this level.
     #[inline]
     pub fn dispatch<K: Kernel>(self, kernel: K) -> K::Out {
+        #[cfg(any(test, feature = "scalar"))]
+        if self == Self::SCALAR {
+            return kernel.run(crate::scalar::Scalar);
+        }
         #[cfg(target_arch = "x86_64")]
         match self.0 {
             // SAFETY: a `Level` of this tier exists only where `has_avx512` was true.
             Tier::Avx512 => return unsafe { crate::x86::with_avx512(kernel) },
             // SAFETY: a `Level` of this tier exists only where `has_avx2` was true.
             Tier::Avx2 => return unsafe { crate::x86::with_avx2(kernel) },
-            Tier::Baseline => {}
+            _ => {}
         }
         kernel.run(Baseline)
     }

@@ -14,6 +14,8 @@ mod baseline;
 pub mod half;
 mod lanes;
 mod level;
+#[cfg(any(test, feature = "scalar"))]
+mod scalar;
 mod stack;
 #[cfg(target_arch = "x86_64")]
 mod x86;

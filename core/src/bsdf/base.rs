@@ -1,11 +1,13 @@
 //! Diffuse base of a surface, and the directional dependence of its light by the transmittance of the coat.
 
-use super::albedo::{self, SchlickAlbedo, SchlickFit};
-use super::{Bsdf, Features, coated};
+use super::albedo::SchlickFit;
+use super::{All, Bsdf, COATS};
 use crate::Rgb;
 use bytemuck::{Pod, Zeroable};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
+use halflight_simd::kernels::shade::bsdf::viewer;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
 /// Largest alpha of a coat whose transmittance follows the fit, and largest reflectance at normal incidence
 /// of a coat of Schlick that does at any alpha.
@@ -39,13 +41,12 @@ impl CoatTransmittance {
     /// Transmittance T at the cosine `c` for light from the base, up to a factor.
     #[inline]
     pub(crate) fn transmittance(&self, c: f32) -> Rgb {
-        if self.eta > 0.0 {
-            return Rgb::splat(albedo::transmittance(c, self.alpha, self.eta));
-        }
-        if self.specular == [0.0; 3] {
+        let Self { specular: tint, alpha, eta } = *self;
+        if eta == 0.0 && tint == [0.0; 3] {
             return Rgb::ONE;
         }
-        Rgb::ONE - SchlickAlbedo::directional(c, self.alpha).of(self.specular.into())
+        let coat = CoatLanes { tint, alpha, eta, dielectric: eta > 0.0, ..CoatLanes::SMOOTH };
+        coat.transmittance(&COATS, c).into()
     }
 }
 
@@ -65,8 +66,8 @@ impl Bsdf {
     #[inline]
     pub(crate) fn base_transmittance_fit(&self) -> Option<SchlickFit<Rgb>> {
         match self {
-            Bsdf::Glossy(b) => Some(coated::Coat::transmittance_fit(b)),
-            Bsdf::Plastic(b) => Some(coated::Coat::transmittance_fit(b)),
+            Bsdf::Glossy(b) => Some(b.transmittance_fit()),
+            Bsdf::Plastic(b) => Some(b.transmittance_fit()),
             _ => None,
         }
     }
@@ -87,21 +88,21 @@ impl Bsdf {
     /// Radiance that the base under a coat reflects to `wo` of light with the irradiance E and the moment
     /// M₅ = ∫ L (1 - cos)⁵ cos dω: base · T(θ_o) (t₀ E + t₅ M₅) / π. Black without a coat.
     #[inline]
-    pub(crate) fn base_radiance<F: Features>(&self, wo: Vec3, irradiance: Rgb, edge_moment: Rgb) -> Rgb {
+    pub(crate) fn base_radiance(&self, wo: Vec3, irradiance: Rgb, edge_moment: Rgb) -> Rgb {
         let Some(SchlickFit { constant, edge }) = self.base_transmittance_fit() else { return Rgb::ZERO };
         let transmitted = (constant * irradiance + edge * edge_moment).max(Rgb::ZERO);
-        self.base() * self.view::<F>(wo).transmittance * transmitted * FRAC_1_PI
+        self.base() * self.transmittance_at(viewer(wo.into())[2]) * transmitted * FRAC_1_PI
     }
 
     /// Fraction of `f`, which is f(wo, wi) |cos θ_i|, that the base reflects: 0 … 1.
     #[inline]
     pub(crate) fn base_part(&self, wo: Vec3, wi: Vec3, f: Rgb) -> Rgb {
-        let base = match self {
-            Bsdf::Diffuse(_) => return Rgb::ONE,
-            Bsdf::Glossy(b) => coated::of_base(b, wo, wi),
-            Bsdf::Plastic(b) => coated::of_base(b, wo, wi),
-            _ => return Rgb::ZERO,
-        };
+        if let Bsdf::Diffuse(_) = self {
+            return Rgb::ONE;
+        }
+        let Some(coat) = self.coat::<All>() else { return Rgb::ZERO };
+        let coat = CoatLanes { transmittance: coat.transmittance(&COATS, wo.z), ..coat };
+        let base = Rgb::from(coat.base_value(&COATS, wi.with_z(wi.z.max(0.0)).into()));
         Rgb::select(f.cmpgt(base), base / f, Rgb::ONE)
     }
 }
@@ -109,7 +110,7 @@ impl Bsdf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bsdf::{All, Glossy, Plastic, fresnel};
+    use crate::bsdf::{Glossy, Plastic, fresnel};
     use crate::sampling::Random;
     use crate::sampling::warp::cosine_hemisphere;
 
@@ -132,7 +133,7 @@ mod tests {
             let (of_base, _) = bsdf.evaluate_apart::<All>(wo, wi, 1.0)[0];
             exact += share * of_base / wi.z;
         }
-        let found = bsdf.base_radiance::<All>(wo, irradiance, moment);
+        let found = bsdf.base_radiance(wo, irradiance, moment);
         ((found - exact) / exact).abs().max_element()
     }
 

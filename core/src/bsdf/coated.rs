@@ -1,188 +1,114 @@
-//! Rough or smooth coat over a diffuse base. The base receives the light that the coat transmits on the way
-//! in and on the way out (Ashikhmin et al. 2000, §2.4; Kelemen and Szirmay-Kalos 2001):
-//!
-//! f = D G F / (4 cos θ_o cos θ_i) + base · T(θ_o) T(θ_i) / π
-//!
-//! The model is symmetric in the directions, hence reciprocal. [`super::Glossy`] and [`super::Plastic`]
-//! define F, T and base, and show that energy is conserved.
+//! BSDFs with a coat over a diffuse base. [`super::Glossy`] and [`super::Plastic`] show that energy is
+//! conserved.
 
-use super::BsdfSample;
-use super::albedo::SchlickFit;
-use super::conductor::half_cosine;
-use super::ggx::Ggx;
+use super::{All, Bsdf, BsdfSample, COATS, Features};
 use crate::Rgb;
-use crate::sampling::warp::cosine_hemisphere;
-use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
-use halflight_simd::kernels::shade::coat::COAT_WEIGHT;
+use halflight_simd::kernels::shade::bsdf::viewer;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
-/// Model of a coat.
-pub(super) trait Coat {
-    /// GGX alpha; 0 is smooth.
-    fn alpha(&self) -> f32;
-    /// F: reflectance of a microfacet at the cosine `c`.
-    fn reflectance(&self, c: f32) -> Rgb;
-    /// T: transmittance at the cosine `c`.
-    fn transmittance(&self, c: f32) -> Rgb;
-    /// Directional albedo of the coat at the cosine `c`, an estimate.
-    fn specular_albedo(&self, c: f32) -> Rgb;
-    /// Factor of the base.
-    fn base(&self) -> Rgb;
-    /// ∫ 2c T(c) dc: mean transmittance for uniform light from the base, an estimate.
-    fn mean_transmittance(&self) -> Rgb;
-
-    /// Least-squares fit to T.
-    fn transmittance_fit(&self) -> SchlickFit<Rgb>;
-
-    /// Probability of the coat's lobe: its share of the energy that leaves towards `wo`, with the weight
-    /// [`COAT_WEIGHT`] of the coat, and `base_weight` of the base.
-    #[inline]
-    fn coat_probability(&self, c: f32, transmittance: Rgb, base_weight: f32) -> f32 {
-        let coat = COAT_WEIGHT * self.specular_albedo(c).element_sum();
-        let base = (self.base() * transmittance * self.mean_transmittance()).element_sum() * base_weight;
-        if base > 0.0 { (coat / (coat + base)).clamp(0.0, 1.0) } else { 1.0 }
-    }
-}
-
-/// True if the peak of the coat is brighter than a quarter of a white diffuse surface (1 / π). At normal
-/// incidence the peak of GGX is F / (4 π α²).
-#[inline]
-pub(super) fn is_narrow(coat: &impl Coat) -> bool {
-    coat.alpha() * coat.alpha() < coat.reflectance(1.0).max_element()
-}
-
-/// [`sample`] of base or coat alone, the base chosen with the weight `base_weight`. Weight and density are
-/// those of the chosen lobe, including the probability of the choice. The flag is true for the coat.
-#[inline]
-pub(super) fn sample_apart(
-    coat: &impl Coat,
+/// BSDF for a fixed viewer, with everything precomputed that does not depend on the light.
+#[derive(Clone, Copy)]
+pub(crate) struct BsdfView<'b> {
+    bsdf: &'b Bsdf,
     wo: Vec3,
-    u: [f32; 3],
-    base_weight: f32,
-) -> Option<(BsdfSample, bool)> {
-    let transmittance_o = coat.transmittance(wo.z);
-    let p = coat.coat_probability(wo.z, transmittance_o, base_weight);
-    let is_coat = u[2] < p;
-    let wi = match is_coat {
-        true if coat.alpha() == 0.0 => {
-            return Some((BsdfSample::mirrored(wo, coat.reflectance(wo.z) / p, p), true));
-        }
-        true => Ggx::new(coat.alpha()).sample_reflection(wo, [u[0], u[1]]),
-        false => cosine_hemisphere([u[0], u[1]]),
-    };
-    let [of_base, of_coat] = evaluate_apart(coat, wo, wi, base_weight);
-    let (value, pdf) = if is_coat { of_coat } else { of_base };
-    (pdf > 0.0).then(|| (BsdfSample::reflection(wi, value / pdf, pdf), is_coat))
+    /// Coat with T(θ_o).
+    coat: Option<CoatLanes<f32>>,
+    /// True to leave out the coat.
+    base_alone: bool,
 }
 
-/// [`evaluate`] of the base and of the coat, each alone, with the densities of [`sample_apart`]; zeros for a
-/// smooth coat.
-#[inline]
-pub(super) fn evaluate_apart(coat: &impl Coat, wo: Vec3, wi: Vec3, base_weight: f32) -> [(Rgb, f32); 2] {
-    if !(wi.z > 0.0) {
-        return [(Rgb::ZERO, 0.0); 2];
-    }
-    let transmittance_o = coat.transmittance(wo.z);
-    let p = coat.coat_probability(wo.z, transmittance_o, base_weight);
-    let of_base = (base_value(coat, wi, transmittance_o), (1.0 - p) * (wi.z * FRAC_1_PI));
-    if coat.alpha() == 0.0 {
-        return [of_base, (Rgb::ZERO, 0.0)];
-    }
-    let density = p * Ggx::new(coat.alpha()).reflection_density(wo, wo + wi);
-    [of_base, (coat_value(coat, wo, wi), density)]
-}
-
-/// Part of a coat that depends on the viewer alone.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct CoatView {
-    /// T(θ_o).
-    transmittance: Rgb,
-    /// Probability of the coat in the choice of the lobe.
-    probability: f32,
-}
-
-impl CoatView {
-    /// `coat`, seen at the cosine `c`.
+impl BsdfView<'_> {
+    /// f(wo, wi) |cos θ_i|, equal to [`Bsdf::evaluate`] to the bit.
     #[inline]
-    pub(super) fn of(coat: &impl Coat, c: f32) -> Self {
-        let transmittance = coat.transmittance(c);
-        Self { transmittance, probability: coat.coat_probability(c, transmittance, 1.0) }
-    }
-}
-
-/// See [`super::Bsdf::sample`].
-#[inline]
-pub(super) fn sample(coat: &impl Coat, view: CoatView, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-    let CoatView { transmittance: transmittance_o, probability: p } = view;
-    let smooth = coat.alpha() == 0.0;
-    if u[2] < p {
-        if smooth {
-            return Some(BsdfSample::mirrored(wo, coat.reflectance(wo.z) / p, p));
+    pub(crate) fn value<F: Features>(&self, wi: Vec3) -> Rgb {
+        match &self.coat {
+            Some(_) if !(wi.z > 0.0) => Rgb::ZERO,
+            Some(coat) if self.base_alone => coat.base_value(&COATS, wi.into()).into(),
+            Some(coat) => coat.evaluate(&COATS, viewer(self.wo.into()), wi.into()).0.into(),
+            None => self.bsdf.evaluate::<F>(self.wo, wi).0,
         }
-        let wi = Ggx::new(coat.alpha()).sample_reflection(wo, [u[0], u[1]]);
-        return weighted(coat, wo, wi, transmittance_o, p);
     }
-    let wi = cosine_hemisphere([u[0], u[1]]);
-    if smooth && wi.z > 0.0 {
-        // D, the cosine and π cancel.
-        let weight = coat.base() * transmittance_o * coat.transmittance(wi.z) / (1.0 - p);
-        return Some(BsdfSample::reflection(wi, weight, (1.0 - p) * wi.z * FRAC_1_PI));
+}
+
+impl Bsdf {
+    /// Coat and base as a lane; `None` without a coat.
+    #[inline(always)]
+    pub(crate) fn coat<F: Features>(&self) -> Option<CoatLanes<f32>> {
+        match self {
+            Bsdf::Glossy(b) if F::GLOSSY => Some(b.lane()),
+            Bsdf::Plastic(b) if F::GLOSSY => Some(b.lane()),
+            _ => None,
+        }
     }
-    weighted(coat, wo, wi, transmittance_o, p)
-}
 
-/// See [`super::Bsdf::evaluate`].
-#[inline]
-pub(super) fn evaluate(coat: &impl Coat, view: CoatView, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-    if !(wi.z > 0.0) {
-        return (Rgb::ZERO, 0.0);
+    /// BSDF for the viewer at `wo`, for light from many directions.
+    #[inline]
+    pub(crate) fn view<F: Features>(&self, wo: Vec3) -> BsdfView<'_> {
+        let [.., c] = viewer(wo.into());
+        let with = |coat: CoatLanes<f32>| CoatLanes { transmittance: coat.transmittance(&COATS, c), ..coat };
+        BsdfView { bsdf: self, wo, coat: self.coat::<F>().map(with), base_alone: false }
     }
-    both_lobes(coat, wo, wi, view.transmittance, view.probability)
-}
 
-/// f cos θ_i of the base.
-#[inline]
-pub(super) fn of_base(coat: &impl Coat, wo: Vec3, wi: Vec3) -> Rgb {
-    coat.base() * coat.transmittance(wo.z) * coat.transmittance(wi.z) * (wi.z.max(0.0) * FRAC_1_PI)
-}
-
-#[inline]
-fn weighted(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) -> Option<BsdfSample> {
-    if !(wi.z > 0.0) {
-        return None;
+    /// [`Bsdf::view`] without the coat if `base_alone`.
+    #[inline]
+    pub(crate) fn view_apart<F: Features>(&self, wo: Vec3, base_alone: bool) -> BsdfView<'_> {
+        BsdfView { base_alone, ..self.view::<F>(wo) }
     }
-    let (value, pdf) = both_lobes(coat, wo, wi, transmittance_o, p);
-    (pdf > 0.0).then(|| BsdfSample::reflection(wi, value / pdf, pdf))
-}
 
-/// f cos θ_i and density of base and rough coat together.
-#[inline]
-fn both_lobes(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) -> (Rgb, f32) {
-    let value = value(coat, wo, wi, transmittance_o);
-    let base_pdf = (1.0 - p) * (wi.z * FRAC_1_PI);
-    if coat.alpha() == 0.0 {
-        return (value, base_pdf);
+    /// [`Bsdf::sample`] of the base or the coat alone. Weight and density are those of the chosen lobe,
+    /// including the probability of the choice; the base has the weight `base_weight` in the choice, 1 in
+    /// [`Bsdf::sample`], 0 to sample the coat always. The flag is true for the coat.
+    #[inline]
+    pub(crate) fn sample_apart<F: Features>(
+        &self,
+        wo: Vec3,
+        u: [f32; 3],
+        base_weight: f32,
+    ) -> Option<(BsdfSample, bool)> {
+        let (wo, coat) = (viewer(wo.into()), self.coat::<F>()?);
+        let coat = CoatLanes { base_weight, ..coat }.see(&COATS, wo[2]);
+        let (sample, is_coat) = coat.sample_apart(&COATS, wo, u);
+        BsdfSample::of(sample).map(|sample| (sample, is_coat))
     }
-    (value, base_pdf + p * Ggx::new(coat.alpha()).reflection_density(wo, wo + wi))
-}
 
-/// f cos θ_i of base and rough coat together, for `wi` above the surface and known T(θ_o).
-#[inline]
-pub(super) fn value(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb) -> Rgb {
-    let base = base_value(coat, wi, transmittance_o);
-    if coat.alpha() == 0.0 { base } else { base + coat_value(coat, wo, wi) }
-}
+    /// [`Bsdf::evaluate`] of the base and of the coat, each alone, with the densities of
+    /// [`Bsdf::sample_apart`]; zeros for a smooth coat.
+    #[inline]
+    pub(crate) fn evaluate_apart<F: Features>(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        base_weight: f32,
+    ) -> [(Rgb, f32); 2] {
+        let (wo, wi) = (viewer(wo.into()), wi.to_array());
+        match self.coat::<F>() {
+            Some(coat) if wi[2] > 0.0 => {
+                let coat = CoatLanes { base_weight, ..coat }.see(&COATS, wo[2]);
+                coat.evaluate_apart(&COATS, wo, wi).map(|(f, pdf)| (f.into(), pdf))
+            }
+            _ => [(Rgb::ZERO, 0.0); 2],
+        }
+    }
 
-/// f cos θ_i of the base alone.
-#[inline]
-pub(super) fn base_value(coat: &impl Coat, wi: Vec3, transmittance_o: Rgb) -> Rgb {
-    coat.base() * transmittance_o * coat.transmittance(wi.z) * (wi.z * FRAC_1_PI)
-}
+    /// True for a coat, rough or smooth, whose peak is brighter than a quarter of a white diffuse surface
+    /// (1 / π). At normal incidence the peak of GGX is F / (4 π α²).
+    #[inline]
+    pub(crate) fn has_narrow_coat(&self) -> bool {
+        let is_narrow =
+            |coat: CoatLanes<f32>| coat.alpha * coat.alpha < Rgb::from(coat.reflectance(1.0)).max_element();
+        self.coat::<All>().is_some_and(is_narrow)
+    }
 
-/// f cos θ_i of a rough coat alone.
-#[inline]
-fn coat_value(coat: &impl Coat, wo: Vec3, wi: Vec3) -> Rgb {
-    let ggx = Ggx::new(coat.alpha());
-    let h = wo + wi;
-    coat.reflectance(half_cosine(wo, h)) * (ggx.density(h) * ggx.visibility(wo, wi) * wi.z)
+    /// True for a coat that is not smooth.
+    #[inline]
+    pub(crate) fn has_rough_coat(&self) -> bool {
+        self.coat::<All>().is_some_and(|coat| coat.alpha > 0.0)
+    }
+
+    /// Transmittance of a coat at the cosine `c`.
+    #[inline]
+    pub(crate) fn transmittance_at(&self, c: f32) -> Rgb {
+        self.coat::<All>().map_or(Rgb::ONE, |coat| coat.transmittance(&COATS, c).into())
+    }
 }

@@ -7,12 +7,10 @@
 //! a weighted mean of two such surfaces.
 
 use super::CoatTransmittance;
-use super::albedo::{SchlickAlbedo, SchlickFit, schlick_albedo_fit};
-use super::coated::Coat;
-use super::{fresnel, range::unit};
+use super::albedo::{self, SchlickFit, schlick_albedo_fit};
+use super::range::unit;
 use crate::Rgb;
-use halflight_simd::kernels::shade::coat::CoatBlock;
-use halflight_simd::kernels::shade::put;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
 /// Coat over a base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +21,8 @@ pub struct Glossy {
     specular: Rgb,
     /// Reflectance at normal incidence of the blend of coat and metal. Schlick's formula is linear in it.
     f0: Rgb,
+    /// Mean transmittance for uniform light from the base.
+    mean: Rgb,
     /// GGX alpha; 0 is smooth.
     alpha: f32,
 }
@@ -36,11 +36,13 @@ impl Glossy {
     #[inline]
     pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32) -> Self {
         let metallic = unit(metallic);
-        let mean = Rgb::ONE - SchlickAlbedo::mean(alpha).of(specular);
+        let [white, edge] = albedo::schlick_mean(alpha);
+        let mean = Rgb::ONE - (specular * (white - edge) + Rgb::splat(edge));
         Self {
             base: color * (1.0 - metallic) / mean.max(Rgb::splat(LEAST_MEAN)),
             specular,
             f0: specular.lerp(color, metallic),
+            mean,
             alpha,
         }
     }
@@ -58,55 +60,31 @@ impl Glossy {
         (self.base != Rgb::ZERO).then(|| CoatTransmittance::schlick(self.alpha, self.specular))
     }
 
-    /// Makes the surface that of vertex `i` of a block.
-    #[inline]
-    pub(crate) fn put(&self, block: &mut CoatBlock, i: usize) {
-        put(&mut block.base, i, self.base.to_array());
-        put(&mut block.tint, i, self.specular.to_array());
-        put(&mut block.metal, i, self.f0.to_array());
-        put(&mut block.mean, i, self.mean_transmittance().to_array());
-        (block.metallic[i & 15], block.alpha[i & 15], block.eta[i & 15]) = (1.0, self.alpha, 1.5);
-        block.exists |= 1 << i;
+    /// Coat and base as a lane.
+    #[inline(always)]
+    pub(super) fn lane(&self) -> CoatLanes<f32> {
+        CoatLanes {
+            base: self.base.into(),
+            tint: self.specular.into(),
+            metal: self.f0.into(),
+            metallic: 1.0,
+            alpha: self.alpha,
+            mean: self.mean.into(),
+            ..CoatLanes::SMOOTH
+        }
+    }
+
+    pub(super) fn base(&self) -> Rgb {
+        self.base
     }
 
     pub(super) fn is_delta(&self) -> bool {
         self.alpha == 0.0 && self.base == Rgb::ZERO
     }
-}
 
-impl Coat for Glossy {
+    /// Least-squares fit to the transmittance.
     #[inline]
-    fn alpha(&self) -> f32 {
-        self.alpha
-    }
-
-    #[inline]
-    fn reflectance(&self, c: f32) -> Rgb {
-        fresnel::schlick(self.f0, c)
-    }
-
-    #[inline]
-    fn transmittance(&self, c: f32) -> Rgb {
-        Rgb::ONE - SchlickAlbedo::directional(c, self.alpha).of(self.specular)
-    }
-
-    #[inline]
-    fn specular_albedo(&self, c: f32) -> Rgb {
-        SchlickAlbedo::directional(c, self.alpha).of(self.f0)
-    }
-
-    #[inline]
-    fn base(&self) -> Rgb {
-        self.base
-    }
-
-    #[inline]
-    fn mean_transmittance(&self) -> Rgb {
-        Rgb::ONE - SchlickAlbedo::mean(self.alpha).of(self.specular)
-    }
-
-    #[inline]
-    fn transmittance_fit(&self) -> SchlickFit<Rgb> {
+    pub(super) fn transmittance_fit(&self) -> SchlickFit<Rgb> {
         // The albedo is specular · (white - edge) + edge.
         let [white, edge] = schlick_albedo_fit(self.alpha);
         let of = |white: f32, edge: f32| self.specular * (white - edge) + Rgb::splat(edge);

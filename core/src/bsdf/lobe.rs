@@ -1,7 +1,6 @@
 //! Rough reflection of a BSDF as the lobe that a radiance cache serves.
 
-use super::coated::Coat;
-use super::{Bsdf, fresnel};
+use super::{All, Bsdf, fresnel};
 use crate::Rgb;
 use core::f32::consts::FRAC_1_PI;
 
@@ -25,9 +24,12 @@ impl Bsdf {
     pub(crate) fn microfacet_lobe(&self) -> Option<MicrofacetLobe> {
         let lobe = match self {
             Bsdf::Conductor(b) => MicrofacetLobe { alpha: b.alpha, f0: b.f0, tint: Rgb::ONE, eta: None },
-            Bsdf::Glossy(b) => {
-                MicrofacetLobe { alpha: b.alpha(), f0: b.reflectance(1.0), tint: Rgb::ONE, eta: None }
-            }
+            Bsdf::Glossy(b) => MicrofacetLobe {
+                alpha: b.alpha(),
+                f0: b.lane().reflectance(1.0).into(),
+                tint: Rgb::ONE,
+                eta: None,
+            },
             Bsdf::Plastic(b) => {
                 let tint = b.coat_tint()?;
                 MicrofacetLobe { alpha: b.alpha(), f0: Rgb::ONE, tint, eta: Some(b.eta()) }
@@ -35,15 +37,6 @@ impl Bsdf {
             _ => return None,
         };
         (lobe.alpha > 0.0).then_some(lobe)
-    }
-
-    /// Transmittance of a coat at the cosine `c`.
-    pub(crate) fn transmittance_at(&self, c: f32) -> Rgb {
-        match self {
-            Bsdf::Glossy(b) => b.transmittance(c),
-            Bsdf::Plastic(b) => b.transmittance(c),
-            _ => Rgb::ONE,
-        }
     }
 
     /// base · T(θ_o) / π at the viewer's cosine `cos`: factor of ∫ L T(θ_i) cos dω in the radiance of the
@@ -69,10 +62,9 @@ impl Bsdf {
 
     /// Reflectance of a microfacet of a metal or a coat at the cosine `c`; 1 for other surfaces.
     pub(crate) fn facet_reflectance(&self, c: f32) -> Rgb {
-        match self {
-            Bsdf::Conductor(b) => fresnel::schlick(b.f0, c),
-            Bsdf::Glossy(b) => b.reflectance(c),
-            Bsdf::Plastic(b) => b.reflectance(c),
+        match (self, self.coat::<All>()) {
+            (Bsdf::Conductor(b), _) => fresnel::schlick(b.f0.into(), c).into(),
+            (_, Some(coat)) => coat.reflectance(c).into(),
             _ => Rgb::ONE,
         }
     }

@@ -1,4 +1,5 @@
-//! BSDF at a point: one file per model behind the closed enum [`Bsdf`].
+//! BSDF at a point: parameters of the models behind the closed enum [`Bsdf`]. Their formulas are functions
+//! over lanes ([`halflight_simd::kernels::shade`]), called with f32 as a lane.
 //!
 //! Directions are local and point away from the surface: z is the shading normal on the side of the viewer,
 //! `wo` points to the viewer and `wi` to the origin of the light. Transmission is that of radiance and
@@ -11,34 +12,28 @@ mod albedo;
 mod base;
 mod class;
 mod coated;
-mod conductor;
-mod dielectric;
-mod diffuse;
-pub mod fresnel;
-pub mod ggx;
 mod glossy;
 mod lobe;
-mod mirror;
 mod plastic;
 mod range;
 mod resolve;
-mod rough_dielectric;
+mod uncoated;
 
 pub use crate::features::{All, DiffuseOnly, DiffuseTextured, Features, Only, Opaque};
 pub(crate) use albedo::COATS;
 pub(crate) use base::CoatTransmittance;
-use coated::CoatView;
-pub use conductor::Conductor;
-pub use dielectric::Dielectric;
-pub use diffuse::Diffuse;
 pub use glossy::Glossy;
+pub use halflight_simd::kernels::shade::{fresnel, ggx};
 pub(crate) use lobe::MicrofacetLobe;
-pub use mirror::Mirror;
 pub use plastic::Plastic;
-pub use rough_dielectric::RoughDielectric;
+pub use uncoated::{Conductor, Dielectric, Diffuse, Mirror, RoughDielectric};
 
 use crate::Rgb;
 use glam::Vec3;
+use halflight_simd::kernels::shade::bsdf::{
+    SampleLanes, diffuse, metal, sample_diffuse, sample_metal, viewer,
+};
+use halflight_simd::kernels::shade::specular::sample_dielectric;
 
 /// Material at a hit: textures looked up, indices of refraction relative to the side of the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,37 +77,13 @@ impl BsdfSample {
         Self { direction, weight, pdf, delta: false, transmitted: false, eta: 1.0 }
     }
 
+    /// Sample of a lane.
     #[inline]
-    fn mirrored(wo: Vec3, weight: Rgb, probability: f32) -> Self {
-        let direction = Vec3::new(-wo.x, -wo.y, wo.z);
-        Self { direction, weight, pdf: probability, delta: true, transmitted: false, eta: 1.0 }
-    }
-}
-
-/// BSDF for a fixed viewer, with everything precomputed that does not depend on the light.
-#[derive(Clone, Copy)]
-pub(crate) struct BsdfView<'b> {
-    bsdf: &'b Bsdf,
-    wo: Vec3,
-    /// T(θ_o) of a coat.
-    transmittance: Rgb,
-    /// True to leave out the coat.
-    base_alone: bool,
-}
-
-impl BsdfView<'_> {
-    /// f(wo, wi) |cos θ_i|, equal to [`Bsdf::evaluate`] to the bit.
-    #[inline]
-    pub(crate) fn value<F: Features>(&self, wi: Vec3) -> Rgb {
-        let Self { bsdf, wo, transmittance, base_alone } = *self;
-        match bsdf {
-            Bsdf::Glossy(_) | Bsdf::Plastic(_) if !(wi.z > 0.0) => Rgb::ZERO,
-            Bsdf::Glossy(b) if F::GLOSSY && base_alone => coated::base_value(b, wi, transmittance),
-            Bsdf::Plastic(b) if F::GLOSSY && base_alone => coated::base_value(b, wi, transmittance),
-            Bsdf::Glossy(b) if F::GLOSSY => coated::value(b, wo, wi, transmittance),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::value(b, wo, wi, transmittance),
-            _ => bsdf.evaluate::<F>(wo, wi).0,
-        }
+    fn of(sample: SampleLanes<f32>) -> Option<Self> {
+        let SampleLanes { direction, weight, pdf, eta, exists, delta } = sample;
+        let transmitted = direction[2] < 0.0;
+        let (direction, weight) = (direction.into(), weight.into());
+        exists.then_some(Self { direction, weight, pdf, delta, transmitted, eta })
     }
 }
 
@@ -121,132 +92,36 @@ impl Bsdf {
     /// `u[2]` chooses the lobe. `None`: absorbed.
     #[inline]
     pub fn sample<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        self.sample_seen::<F>(self.coat_view::<F>(wo), wo, u)
-    }
-
-    /// [`Bsdf::sample`] with a known [`Bsdf::coat_view`].
-    #[inline]
-    fn sample_seen<F: Features>(&self, view: CoatView, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        let wo = above_horizon(wo);
-        match self {
-            Bsdf::Diffuse(b) => b.sample([u[0], u[1]]),
-            Bsdf::Mirror(b) if F::GLOSSY => b.sample(wo),
-            Bsdf::Conductor(b) if F::GLOSSY => b.sample(wo, [u[0], u[1]]),
-            Bsdf::Glossy(b) if F::GLOSSY => coated::sample(b, view, wo, u),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::sample(b, view, wo, u),
-            Bsdf::Dielectric(b) if F::DIELECTRIC => b.sample(wo, u[2]),
-            Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.sample(wo, u),
-            _ => None,
-        }
+        let (wo, at) = (viewer(wo.into()), [u[0], u[1]]);
+        BsdfSample::of(match self {
+            Bsdf::Diffuse(b) => sample_diffuse(b.reflectance.into(), at),
+            Bsdf::Mirror(b) if F::GLOSSY => SampleLanes::mirrored(wo, b.reflectance.into(), 1.0),
+            Bsdf::Conductor(b) if F::GLOSSY && b.alpha == 0.0 => {
+                SampleLanes::mirrored(wo, fresnel::schlick(b.f0.into(), wo[2]), 1.0)
+            }
+            Bsdf::Conductor(b) if F::GLOSSY => sample_metal(b.f0.into(), b.alpha, wo, at),
+            Bsdf::Glossy(b) if F::GLOSSY => b.lane().see(&COATS, wo[2]).sample(&COATS, wo, u),
+            Bsdf::Plastic(b) if F::GLOSSY => b.lane().see(&COATS, wo[2]).sample(&COATS, wo, u),
+            Bsdf::Dielectric(b) if F::DIELECTRIC => sample_dielectric(b.tint.into(), b.eta, wo, u[2]),
+            Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.lane().sample(wo, u),
+            _ => return None,
+        })
     }
 
     /// f(wo, wi) |cos θ_i|, and the density of [`Bsdf::sample`] at `wi`. Zeros for delta lobes.
     #[inline]
     pub fn evaluate<F: Features>(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        if let Bsdf::Glossy(_) | Bsdf::Plastic(_) = self
-            && !(wi.z > 0.0)
-        {
-            return (Rgb::ZERO, 0.0);
-        }
-        self.evaluate_seen::<F>(self.coat_view::<F>(wo), wo, wi)
-    }
-
-    /// [`Bsdf::evaluate`] with a known [`Bsdf::coat_view`].
-    #[inline]
-    fn evaluate_seen<F: Features>(&self, view: CoatView, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let wo = above_horizon(wo);
-        match self {
-            Bsdf::Diffuse(b) => b.evaluate(wi),
-            Bsdf::Conductor(b) if F::GLOSSY => b.evaluate(wo, wi),
-            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate(b, view, wo, wi),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate(b, view, wo, wi),
-            Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.evaluate(wo, wi),
-            _ => (Rgb::ZERO, 0.0),
-        }
-    }
-
-    /// Part of a coat that depends on the viewer alone.
-    #[inline]
-    fn coat_view<F: Features>(&self, wo: Vec3) -> CoatView {
-        let c = above_horizon(wo).z;
-        match self {
-            Bsdf::Glossy(b) if F::GLOSSY => CoatView::of(b, c),
-            Bsdf::Plastic(b) if F::GLOSSY => CoatView::of(b, c),
-            _ => CoatView::default(),
-        }
-    }
-
-    /// BSDF for the viewer at `wo`, for light from many directions.
-    #[inline]
-    pub(crate) fn view<F: Features>(&self, wo: Vec3) -> BsdfView<'_> {
-        let wo = above_horizon(wo);
-        let transmittance = match self {
-            Bsdf::Glossy(b) if F::GLOSSY => coated::Coat::transmittance(b, wo.z),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::Coat::transmittance(b, wo.z),
-            _ => Rgb::ONE,
+        let (wo, wi): (_, [f32; 3]) = (viewer(wo.into()), wi.into());
+        let (f, pdf) = match self {
+            Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.lane().evaluate(wo, wi),
+            _ if !(wi[2] > 0.0) => return (Rgb::ZERO, 0.0),
+            Bsdf::Diffuse(b) => diffuse(b.reflectance.into(), wi),
+            Bsdf::Conductor(b) if F::GLOSSY && b.alpha > 0.0 => metal(b.f0.into(), b.alpha, wo, wi),
+            Bsdf::Glossy(b) if F::GLOSSY => b.lane().see(&COATS, wo[2]).evaluate(&COATS, wo, wi),
+            Bsdf::Plastic(b) if F::GLOSSY => b.lane().see(&COATS, wo[2]).evaluate(&COATS, wo, wi),
+            _ => return (Rgb::ZERO, 0.0),
         };
-        BsdfView { bsdf: self, wo, transmittance, base_alone: false }
-    }
-
-    /// [`Bsdf::view`] without the coat if `base_alone`.
-    #[inline]
-    pub(crate) fn view_apart<F: Features>(&self, wo: Vec3, base_alone: bool) -> BsdfView<'_> {
-        BsdfView { base_alone, ..self.view::<F>(wo) }
-    }
-
-    /// [`Bsdf::sample`] of the base or the coat alone. Weight and density are those of the chosen lobe,
-    /// including the probability of the choice; the base has the weight `base_weight` in the choice, 1 in
-    /// [`Bsdf::sample`], 0 to sample the coat always. The flag is true for the coat.
-    #[inline]
-    pub(crate) fn sample_apart<F: Features>(
-        &self,
-        wo: Vec3,
-        u: [f32; 3],
-        base_weight: f32,
-    ) -> Option<(BsdfSample, bool)> {
-        let wo = above_horizon(wo);
-        match self {
-            Bsdf::Glossy(b) if F::GLOSSY => coated::sample_apart(b, wo, u, base_weight),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::sample_apart(b, wo, u, base_weight),
-            _ => None,
-        }
-    }
-
-    /// [`Bsdf::evaluate`] of the base and of the coat, each alone, with the densities of
-    /// [`Bsdf::sample_apart`].
-    #[inline]
-    pub(crate) fn evaluate_apart<F: Features>(
-        &self,
-        wo: Vec3,
-        wi: Vec3,
-        base_weight: f32,
-    ) -> [(Rgb, f32); 2] {
-        let wo = above_horizon(wo);
-        match self {
-            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi, base_weight),
-            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi, base_weight),
-            _ => [(Rgb::ZERO, 0.0); 2],
-        }
-    }
-
-    /// True for a coat, rough or smooth, whose peak is brighter than a quarter of a white diffuse surface.
-    #[inline]
-    pub(crate) fn has_narrow_coat(&self) -> bool {
-        match self {
-            Bsdf::Glossy(b) => coated::is_narrow(b),
-            Bsdf::Plastic(b) => coated::is_narrow(b),
-            _ => false,
-        }
-    }
-
-    /// True for a coat that is not smooth.
-    #[inline]
-    pub(crate) fn has_rough_coat(&self) -> bool {
-        match self {
-            Bsdf::Glossy(b) => b.alpha() > 0.0,
-            Bsdf::Plastic(b) => b.alpha() > 0.0,
-            _ => false,
-        }
+        (f.into(), pdf)
     }
 
     /// True if every lobe is a delta lobe: light samples contribute nothing.
@@ -266,8 +141,8 @@ impl Bsdf {
     pub(crate) fn base(&self) -> Rgb {
         match self {
             Bsdf::Diffuse(b) => b.reflectance,
-            Bsdf::Glossy(b) => coated::Coat::base(b),
-            Bsdf::Plastic(b) => coated::Coat::base(b),
+            Bsdf::Glossy(b) => b.base(),
+            Bsdf::Plastic(b) => b.base(),
             _ => Rgb::ZERO,
         }
     }
@@ -281,14 +156,6 @@ impl Bsdf {
 
 // Every hit carries a BSDF through the shading stages: it must fit into a cache line.
 const _: () = assert!(size_of::<Bsdf>() <= 64);
-
-/// `wo` raised above the horizon by the resolution of f32 directions, so that squares of half-vectors are
-/// normal floats.
-#[inline]
-fn above_horizon(wo: Vec3) -> Vec3 {
-    const RESOLUTION: f32 = 1e-7;
-    Vec3::new(wo.x, wo.y, wo.z.max(RESOLUTION))
-}
 
 /// Correctly rounded square root: one instruction if the processor has it.
 #[inline]

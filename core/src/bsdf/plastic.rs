@@ -8,13 +8,11 @@
 //! that reached it. If rough, it returns less, as in every model of one bounce between microfacets.
 
 use super::CoatTransmittance;
-use super::albedo::{self, SchlickAlbedo, SchlickFit};
-use super::coated::Coat;
+use super::albedo::{self, SchlickFit};
 use super::fresnel;
 use super::range::{MAX_INDEX, unit};
 use crate::Rgb;
-use halflight_simd::kernels::shade::coat::CoatBlock;
-use halflight_simd::kernels::shade::put;
+use halflight_simd::kernels::shade::coat_lanes::CoatLanes;
 
 /// Dielectric coat over a diffuse base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,8 +28,6 @@ pub struct Plastic {
     alpha: f32,
     /// Index of refraction of the coat, at least 1.
     eta: f32,
-    /// Reflectance of the coat at normal incidence, from `eta` alone.
-    f0: f32,
 }
 
 impl Plastic {
@@ -51,7 +47,6 @@ impl Plastic {
             metallic,
             alpha,
             eta,
-            f0,
         }
     }
 
@@ -74,66 +69,33 @@ impl Plastic {
         (self.metallic == 0.0).then_some(self.coat)
     }
 
-    /// Makes the surface that of vertex `i` of a block.
-    #[inline]
-    pub(crate) fn put(&self, block: &mut CoatBlock, i: usize) {
-        put(&mut block.base, i, self.base.to_array());
-        put(&mut block.tint, i, self.coat.to_array());
-        put(&mut block.metal, i, self.metal.to_array());
-        put(&mut block.mean, i, self.mean_transmittance().to_array());
-        (block.metallic[i & 15], block.alpha[i & 15], block.eta[i & 15]) =
-            (self.metallic, self.alpha, self.eta);
-        (block.exists, block.dielectric) = (block.exists | 1 << i, block.dielectric | 1 << i);
+    /// Coat and base as a lane.
+    #[inline(always)]
+    pub(super) fn lane(&self) -> CoatLanes<f32> {
+        CoatLanes {
+            base: self.base.into(),
+            tint: self.coat.into(),
+            metal: self.metal.into(),
+            metallic: self.metallic,
+            alpha: self.alpha,
+            eta: self.eta,
+            mean: [1.0 - fresnel::mean_external_reflectance(self.eta); 3],
+            dielectric: true,
+            ..CoatLanes::SMOOTH
+        }
+    }
+
+    pub(super) fn base(&self) -> Rgb {
+        self.base
     }
 
     pub(super) fn is_delta(&self) -> bool {
         self.alpha == 0.0 && self.base == Rgb::ZERO
     }
 
+    /// Least-squares fit to the transmittance.
     #[inline]
-    fn mix(&self, coat: f32, schlick: f32) -> Rgb {
-        self.coat * coat + self.metal + (Rgb::splat(self.metallic) - self.metal) * schlick
-    }
-}
-
-impl Coat for Plastic {
-    #[inline]
-    fn alpha(&self) -> f32 {
-        self.alpha
-    }
-
-    #[inline]
-    fn reflectance(&self, c: f32) -> Rgb {
-        self.mix(fresnel::dielectric(c, self.eta), fresnel::schlick_weight(c))
-    }
-
-    #[inline]
-    fn transmittance(&self, c: f32) -> Rgb {
-        Rgb::splat(albedo::transmittance(c, self.alpha, self.eta))
-    }
-
-    #[inline]
-    fn specular_albedo(&self, c: f32) -> Rgb {
-        if self.alpha == 0.0 {
-            return self.reflectance(c);
-        }
-        // The albedo tables of Schlick's coat also serve the dielectric coat.
-        let of = SchlickAlbedo::directional(c, self.alpha);
-        self.mix(of.edge + self.f0 * (of.white - of.edge), of.edge)
-    }
-
-    #[inline]
-    fn base(&self) -> Rgb {
-        self.base
-    }
-
-    #[inline]
-    fn mean_transmittance(&self) -> Rgb {
-        Rgb::splat(1.0 - fresnel::mean_external_reflectance(self.eta))
-    }
-
-    #[inline]
-    fn transmittance_fit(&self) -> SchlickFit<Rgb> {
+    pub(super) fn transmittance_fit(&self) -> SchlickFit<Rgb> {
         let SchlickFit { constant, edge } = albedo::transmittance_fit(self.alpha, self.eta);
         SchlickFit { constant: Rgb::splat(constant), edge: Rgb::splat(edge) }
     }

@@ -7,17 +7,16 @@ mod hash;
 mod numbers;
 mod primary_sample;
 mod sobol;
-mod trigonometry;
 pub mod warp;
 
 pub use alias::{AliasEntry, AliasTable};
 pub use distribution::{Cell, Distribution2d};
 pub use halflight_simd::kernels::shade::numbers::{mix, unit_float};
+pub use halflight_simd::kernels::shade::warp::sin_cos_turns;
 pub use hash::Random;
 pub use numbers::Numbers;
 pub use primary_sample::Mutation;
 pub use sobol::Sampler;
-pub use trigonometry::sin_cos_turns;
 
 use halflight_simd::kernels::shade::numbers::GOLDEN;
 

@@ -1,22 +1,15 @@
 //! Warps of the unit square to the domains of light transport, with their densities. They are continuous and
 //! of low distortion, so that the stratification of the square is preserved.
 
-use super::ONE_MINUS_EPSILON;
-use super::trigonometry::{sin_cos_octant, sin_cos_turns};
+use super::{ONE_MINUS_EPSILON, sin_cos_turns};
 use core::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::warp as lanes;
 
 /// Uniform point of the unit disk (Shirley and Chiu 1997, concentric map). Density 1/π.
 #[inline]
 pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
-    let (x, y) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
-    let steep = y.abs() > x.abs();
-    let (radius, other) = if steep { (y, x) } else { (x, y) };
-    if radius == 0.0 {
-        return Vec2::ZERO;
-    }
-    let (sin, cos) = sin_cos_octant(FRAC_PI_4 * (other / radius));
-    if steep { radius * Vec2::new(sin, cos) } else { radius * Vec2::new(cos, sin) }
+    lanes::concentric_disk(u).into()
 }
 
 /// Inverse of [`concentric_disk`].
@@ -37,9 +30,7 @@ pub fn concentric_square(point: Vec2) -> [f32; 2] {
 /// density is zero: z² is at least the rounding of 1 - x² - y².
 #[inline]
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
-    const LEAST: f32 = f32::EPSILON / 2.0;
-    let d = concentric_disk(u);
-    d.extend(libm::sqrtf((1.0 - d.length_squared()).max(LEAST)))
+    lanes::cosine_hemisphere(u).into()
 }
 
 /// cos θ / π.
@@ -87,11 +78,5 @@ pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
 /// Map Between Triangle and Square"). Density 1 / area.
 #[inline]
 pub fn uniform_triangle(u: [f32; 2]) -> (f32, f32) {
-    if u[1] > u[0] {
-        let b1 = 0.5 * u[0];
-        (b1, u[1] - b1)
-    } else {
-        let b2 = 0.5 * u[1];
-        (u[0] - b2, b2)
-    }
+    lanes::uniform_triangle(u).into()
 }

@@ -1,4 +1,4 @@
-//! Batch kernels, each with a scalar reference: ray traversal ([`boxes`], [`triangles`], [`push`]), shading
+//! Batch kernels: ray traversal ([`boxes`], [`triangles`], [`push`]), shading
 //! of sixteen vertices ([`shade`]), coefficients and derivatives of incident light ([`cells`], [`mesh`],
 //! [`edge`], [`jumps`], [`outer`], [`dots`], [`eigen`]), and photon maps ([`points`], [`select`]).
 

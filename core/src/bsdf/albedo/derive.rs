@@ -2,6 +2,7 @@
 //! midpoints around it, independent of the code that renders.
 
 use super::*;
+use halflight_simd::kernels::shade::coat_tables::LAST_AMPLITUDE;
 use std::prelude::v1::*;
 use std::{format, println};
 

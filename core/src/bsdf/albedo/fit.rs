@@ -7,7 +7,7 @@
 //! rougher microfacets dims T over all angles, which (1 - c)⁵ does not follow: at alpha 1 the fit is 14 % too
 //! bright at c = 0.5.
 
-use super::{AMPLITUDES, COSINES, Place, ROUGHNESSES, STEP, amplitude, data, lerp, roughness};
+use super::{AMPLITUDES, COSINES, ROUGHNESSES, STEP, amplitude, data, lerp, roughness};
 use crate::bsdf::{fresnel, sqrt};
 
 /// ∫ 2c (1 - c)⁵ dc.
@@ -51,9 +51,9 @@ pub(in crate::bsdf) fn schlick_albedo(alpha: f32) -> [SchlickFit<f32>; 2] {
 pub(in crate::bsdf) fn transmittance(alpha: f32, eta: f32) -> SchlickFit<f32> {
     let mut moments = [1.0 - fresnel::mean_external_reflectance(eta), MEAN_WEIGHT - edge_reflectance(eta)];
     if alpha > 0.0 {
-        let ((k, t), at) = (amplitude(eta), roughness(alpha));
+        let ([k, t], at) = (amplitude(eta), roughness(alpha));
         let table = |k: usize| TRANSMITTANCE.get(k).map_or([0.0; 2], |table| along(table, at));
-        let (low, high) = (table(k), table(k + 1));
+        let (low, high) = (table(k as usize), table(k as usize + 1));
         moments = core::array::from_fn(|m| moments[m] + lerp(low[m], high[m], t));
     }
     SchlickFit::of(moments)
@@ -71,9 +71,9 @@ fn edge_reflectance(eta: f32) -> f32 {
 
 /// Interpolated moments of a row of roughnesses.
 #[inline]
-fn along(row: &[[f32; 2]; ROUGHNESSES], (j, s): Place) -> [f32; 2] {
+fn along(row: &[[f32; 2]; ROUGHNESSES], [j, s]: [f32; 2]) -> [f32; 2] {
     let at = |j: usize| row.get(j).copied().unwrap_or_default();
-    let (low, high) = (at(j), at(j + 1));
+    let (low, high) = (at(j as usize), at(j as usize + 1));
     core::array::from_fn(|m| lerp(low[m], high[m], s))
 }
 

@@ -143,7 +143,7 @@ impl Lobe {
                 let azimuth = Vec2::new(around[1], libm::sqrtf((1.0 - around[1] * around[1]).max(0.0)));
                 let wi = (sin * azimuth).extend(cos);
                 let h = wo + wi;
-                let lobe = ggx.density(h) * ggx.visibility(wo, wi);
+                let lobe = ggx.density(h.into()) * ggx.visibility(wo.into(), wi.into());
                 let cos = wo.dot(h) / h.length();
                 let (white, edge) = (lobe * reflectance(cos), lobe * schlick_weight(cos));
                 for (sum, product) in squares.iter_mut().zip([white * white, white * edge, edge * edge]) {

@@ -40,7 +40,7 @@ const LOBE_STEP: f32 = 0.05;
 #[derive(Clone, Copy, Debug)]
 pub struct ViewedLobe {
     bsdf: Bsdf,
-    ggx: Ggx,
+    ggx: Ggx<f32>,
     alpha: f32,
     wo: Vec3,
     /// 1/d, d the distance to the camera.
@@ -136,7 +136,12 @@ impl ViewedLobe {
 
     /// Local direction of the point `u` of the unit square; it may point below the surface.
     pub fn direction(&self, u: [f32; 2]) -> Vec3 {
-        self.ggx.sample_reflection(self.wo, u)
+        self.reflected_at(self.wo, u)
+    }
+
+    /// [`ViewedLobe::direction`] for another viewer.
+    fn reflected_at(&self, wo: Vec3, u: [f32; 2]) -> Vec3 {
+        self.ggx.sample_reflection(wo.into(), u).into()
     }
 
     /// Reflectance at the half-vector of `wo` and `wi` over that at the mirror direction.
@@ -149,7 +154,8 @@ impl ViewedLobe {
 
     /// g of the direction `wi`.
     fn weight(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        if wi.z > 0.0 { self.tint(wo, wi) * self.ggx.reflection_weight(wo, wi) } else { Rgb::ZERO }
+        let weight = || self.ggx.reflection_weight(wo.into(), wi.into());
+        if wi.z > 0.0 { self.tint(wo, wi) * weight() } else { Rgb::ZERO }
     }
 
     /// g of the direction `wi` for the viewer.
@@ -160,8 +166,9 @@ impl ViewedLobe {
 
     /// K of the direction `wi`.
     fn density(&self, wi: Vec3) -> Rgb {
-        let half = self.wo + wi;
-        let lobe = || self.ggx.density(half) * self.ggx.visibility(self.wo, wi) * wi.z;
+        let (density, visibility) =
+            (self.ggx.density((self.wo + wi).into()), self.ggx.visibility(self.wo.into(), wi.into()));
+        let lobe = || density * visibility * wi.z;
         if wi.z > 0.0 { self.tint(self.wo, wi) * lobe() } else { Rgb::ZERO }
     }
 
@@ -174,9 +181,8 @@ impl ViewedLobe {
     fn corner(&self, viewers: &[[Vec3; 2]; 2], u: [f32; 2]) -> Corner {
         let direction = self.direction(u);
         let per_step = 0.5 * self.inverse_distance / VIEWER_STEP;
-        let moved = viewers.map(|[ahead, back]| {
-            (self.ggx.sample_reflection(ahead, u) - self.ggx.sample_reflection(back, u)) * per_step
-        });
+        let moved = viewers
+            .map(|[ahead, back]| (self.reflected_at(ahead, u) - self.reflected_at(back, u)) * per_step);
         let step = LOBE_STEP * self.alpha;
         let across = direction.any_orthonormal_pair();
         let slope = |along: Vec3| {
@@ -217,8 +223,7 @@ impl ViewedLobe {
             let light = Rgb::from(light);
             reflected += light * self.weight(self.wo, self.direction(u)) * share;
             let change = viewers.map(|[ahead, back]| {
-                let [ahead, back] =
-                    [ahead, back].map(|wo| self.weight(wo, self.ggx.sample_reflection(wo, u)));
+                let [ahead, back] = [ahead, back].map(|wo| self.weight(wo, self.reflected_at(wo, u)));
                 (ahead - back) * (0.5 * share * self.inverse_distance / VIEWER_STEP)
             });
             sums.add_weight(stratum, light, change);

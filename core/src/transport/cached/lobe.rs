@@ -40,7 +40,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         let base = match bsdf.has_coated_base() {
             true => {
                 let wo = frame.to_local(viewer);
-                bsdf.base_radiance::<F>(wo, irradiance.irradiance, edge_moment)
+                bsdf.base_radiance(wo, irradiance.irradiance, edge_moment)
             }
             false => Rgb::ZERO,
         };

@@ -256,7 +256,7 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         {
             let base = match found.irradiance {
                 Some(CachedIrradiance { irradiance, edge_moment, .. }) if has_base => {
-                    bsdf.base_radiance::<F>(wo, irradiance, edge_moment)
+                    bsdf.base_radiance(wo, irradiance, edge_moment)
                 }
                 _ => Rgb::ZERO,
             };
@@ -269,9 +269,7 @@ impl<F: Features> LightEstimator<F> for CacheView<'_> {
         let Some(indirect) = found.irradiance else { return RemainingLight::all(vertex) };
         let contribution = match bsdf {
             Bsdf::Diffuse(diffuse) => throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI,
-            _ if has_base => {
-                throughput * bsdf.base_radiance::<F>(wo, indirect.irradiance, indirect.edge_moment)
-            }
+            _ if has_base => throughput * bsdf.base_radiance(wo, indirect.irradiance, indirect.edge_moment),
             _ => return RemainingLight::all(vertex),
         };
         add(KnownLight { contribution, blur: Rgb::ZERO });

@@ -230,7 +230,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             return Ok(None);
         };
         let base = gathering.irradiance.at(&place.query()).map_or(Rgb::ZERO, |known| {
-            bsdf.base_radiance::<F>(lobe.viewer(), known.irradiance, known.edge_moment)
+            bsdf.base_radiance(lobe.viewer(), known.irradiance, known.edge_moment)
         });
         let picture = place.pixel * libm::sqrtf(self.settings.width as f32 * self.settings.height as f32);
         let metric = gathering.metric.within(picture);

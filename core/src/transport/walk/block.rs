@@ -147,14 +147,10 @@ impl<'a> Block<'a> {
                 self.bsdf.metal |= one;
                 return;
             }
-            Bsdf::Plastic(b) if F::GLOSSY => {
-                b.put(&mut self.coats, i);
-                self.smooth_coats |= u32::from(bsdf.is_delta()) << i;
-                self.others[i] = *bsdf;
-                return;
-            }
-            Bsdf::Glossy(b) if F::GLOSSY => {
-                b.put(&mut self.coats, i);
+            Bsdf::Glossy(_) | Bsdf::Plastic(_) if F::GLOSSY => {
+                if let Some(coat) = bsdf.coat::<F>() {
+                    self.coats.put(i, &coat);
+                }
                 self.smooth_coats |= u32::from(bsdf.is_delta()) << i;
                 self.others[i] = *bsdf;
                 return;
@@ -213,7 +209,6 @@ mod tests {
     use crate::bsdf::{All, COATS, Conductor, Dielectric, Glossy, Mirror, Plastic, RoughDielectric};
     use crate::sampling::Random;
     use crate::sampling::warp::uniform_sphere;
-    use crate::transport::walk::points::Set;
     use glam::Vec3;
     use halflight_simd::kernels::shade::at;
     use halflight_simd::kernels::shade::coat::{CoatLight, CoatSamples};
@@ -286,61 +281,14 @@ mod tests {
                     assert_eq!((Rgb::from(at(value, i)), pdf[i]), (f, density), "{bsdf:?}");
                 }
                 let sample = bsdf.sample::<All>(wo, [u[0][i], u[1][i], lobe[i]]);
-                let is_sampled = bit(sampled[0] & coats.exists | smooth | refracted);
+                let is_sampled = bit(sampled.exists & coats.exists | smooth | refracted);
                 assert_eq!(is_sampled, sample.is_some(), "{bsdf:?}");
                 let Some(sample) = sample else { continue };
-                assert_eq!(bit(sampled[1] | specular.exists), sample.delta, "{bsdf:?}");
+                assert_eq!(bit(sampled.delta | specular.exists), sample.delta, "{bsdf:?}");
                 let found = (at(&given.direction, i), at(&given.weight, i), given.eta[i]);
                 let wanted = (sample.direction.to_array(), sample.weight.to_array(), sample.eta);
                 assert_eq!(found, wanted, "{bsdf:?}");
                 assert_eq!(given.pdf[i], if sample.delta { f32::INFINITY } else { sample.pdf }, "{bsdf:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn lanes_have_the_bits_of_single_coats_apart() {
-        let random = Random::new(6, 0);
-        let (mut block, level) = (Block::new(), Level::detect());
-        block.points.surface.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-            .map(|axis| axis.map(|coordinate| [coordinate; BLOCK]));
-        (block.throughput, block.light.radiance) = ([[1.0; BLOCK]; 3], [[1.0; BLOCK]; 3]);
-        (block.light.pdf, block.light.alone) = ([1.0; BLOCK], 0xffff);
-        for round in 0..200 {
-            block.clear_bsdfs();
-            let mut lobes = [0.0; BLOCK];
-            for (i, lobe) in lobes.iter_mut().enumerate() {
-                let n = 16 * round + i as u32;
-                let number = |k: u32| random.single(20 * n + k);
-                let wo = uniform_sphere([number(6), number(7)]);
-                put(&mut block.points.surface.wo, i, [wo.x, wo.y, wo.z.abs()]);
-                put(&mut block.light.direction, i, uniform_sphere([number(8), number(9)]).to_array());
-                (block.numbers.scatter[0][i], block.numbers.scatter[1][i]) = (number(10), number(11));
-                *lobe = number(12);
-                block.put_bsdf::<All>(i, &surfaces(&random, n), 1);
-                block.separate_coat(i, [0.0, 0.3, 1.0][n as usize % 3], n.is_multiple_of(4));
-            }
-            block.coats.see(level, &block.points.surface, &COATS);
-            block.weigh_apart(level);
-            let Block { points, coats, given, numbers, .. } = &mut block;
-            let (surface, u) = (&points.surface, &numbers.scatter);
-            let samples = CoatSamples { surface, coats, tables: &COATS, u, lobe: &lobes };
-            let sets = samples.compute_apart(level, given);
-            for i in Set(block.coats.apart) {
-                let (bsdf, weight) = (&block.others[i], block.coats.base_weight[i]);
-                let (wo, wi) = (at(&block.points.surface.wo, i), at(&block.light.direction, i));
-                let [base, coat] = bsdf.evaluate_apart::<All>(wo.into(), wi.into(), weight).map(|of| of.0);
-                let base = if block.supplied >> i & 1 == 1 { Rgb::ZERO } else { base };
-                assert_eq!(Rgb::from(at(&block.apart.value, i)), base + coat, "{bsdf:?}");
-                assert_eq!(Rgb::from(at(&block.apart.contribution, i)), base + coat, "{bsdf:?}");
-                let u = [block.numbers.scatter[0][i], block.numbers.scatter[1][i], lobes[i]];
-                let sample = bsdf.sample_apart::<All>(wo.into(), u, weight);
-                assert_eq!(sets.exists >> i & 1 == 1, sample.is_some(), "{bsdf:?}");
-                let Some((sample, is_coat)) = sample else { continue };
-                assert_eq!([sets.delta, sets.coat].map(|set| set >> i & 1 == 1), [sample.delta, is_coat]);
-                let found = (at(&block.given.direction, i), at(&block.given.weight, i), block.given.pdf[i]);
-                let pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
-                assert_eq!(found, (sample.direction.to_array(), sample.weight.to_array(), pdf), "{bsdf:?}");
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::transport::walk::dimension;
 use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
 use glam::Vec3;
-use halflight_simd::kernels::shade::coat::CoatSamples;
+use halflight_simd::kernels::shade::coat::{CoatSamples, CoatSets};
 use halflight_simd::kernels::shade::numbers::Offsets;
 use halflight_simd::kernels::shade::rough::Rough;
 use halflight_simd::kernels::shade::scatter::Scatter;
@@ -111,7 +111,7 @@ impl Block<'_> {
         let surface = &points.surface;
         if coats.exists & !coats.apart & onward != 0 {
             let samples = CoatSamples { surface, coats, tables: &COATS, u: &numbers.scatter, lobe };
-            let [exists, delta] = samples.compute(level, given);
+            let CoatSets { exists, delta, .. } = samples.compute(level, given);
             sets.active &= exists | !coats.exists | coats.apart;
             sets.delta |= delta & !coats.apart;
         }

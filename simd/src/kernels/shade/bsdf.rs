@@ -2,11 +2,11 @@
 
 use super::fresnel::schlick;
 use super::ggx::Ggx;
-use super::load::Load;
 use super::surface::SurfaceBlock;
 use super::vector::{self, add, scale};
-use super::{Row, Row3};
-use crate::lanes::{Lanes, dot};
+use super::{Row, Row3, load3, load33, warp};
+use crate::lanes::{Lanes, Simd, dot};
+use core::f32::consts::FRAC_1_PI;
 
 /// Least height of a viewer above the horizon: squares of half-vectors are normal floats.
 const RESOLUTION: f32 = 1e-7;
@@ -64,15 +64,71 @@ impl<L: Lanes> VertexLanes<L> {
     }
 }
 
+/// Samples of BSDFs over lanes.
+#[derive(Clone, Copy)]
+pub struct SampleLanes<L: Lanes> {
+    /// Local unit directions.
+    pub direction: [L; 3],
+    /// f |cos| / pdf.
+    pub weight: [L; 3],
+    /// Densities in solid angle; probabilities of the choices of delta lobes.
+    pub pdf: L,
+    /// Indices of refraction on the side of the directions over those of the viewer.
+    pub eta: L,
+    /// Lanes with a sample.
+    pub exists: L::Mask,
+    /// Those of delta lobes.
+    pub delta: L::Mask,
+}
+
+impl<L: Lanes> SampleLanes<L> {
+    /// Mirrored directions of delta lobes, chosen with the `probability`.
+    #[inline(always)]
+    pub fn mirrored([x, y, z]: [L; 3], weight: [L; 3], probability: L) -> Self {
+        let one = z.all(1.0);
+        let always = one.eq(one);
+        Self { direction: [-x, -y, z], weight, pdf: probability, eta: one, exists: always, delta: always }
+    }
+
+    /// `self` in lanes where `mask` is set, `other` elsewhere.
+    #[inline(always)]
+    pub(super) fn select(self, mask: L::Mask, other: Self) -> Self {
+        Self {
+            direction: vector::select(mask, self.direction, other.direction),
+            weight: vector::select(mask, self.weight, other.weight),
+            pdf: self.pdf.select(mask, other.pdf),
+            eta: self.eta.select(mask, other.eta),
+            exists: mask & self.exists | !mask & other.exists,
+            delta: mask & self.delta | !mask & other.delta,
+        }
+    }
+}
+
 /// Local direction to a viewer, raised above the horizon.
 #[inline(always)]
-pub(super) fn viewer<L: Lanes>([x, y, z]: [L; 3]) -> [L; 3] {
+pub fn viewer<L: Lanes>([x, y, z]: [L; 3]) -> [L; 3] {
     [x, y, z.max(z.all(RESOLUTION))]
+}
+
+/// f |cos| and density of a diffuse surface.
+#[inline(always)]
+pub fn diffuse<L: Lanes>(reflectance: [L; 3], [.., z]: [L; 3]) -> ([L; 3], L) {
+    let lambert = z.max(z.all(0.0)) * z.all(FRAC_1_PI);
+    (scale(reflectance, lambert), lambert)
+}
+
+/// Samples a diffuse surface.
+#[inline(always)]
+pub fn sample_diffuse<L: Lanes>(reflectance: [L; 3], u: [L; 2]) -> SampleLanes<L> {
+    let direction = warp::cosine_hemisphere(u);
+    let (zero, one, pdf) = (u[0].all(0.0), u[0].all(1.0), direction[2] * u[0].all(FRAC_1_PI));
+    let exists = zero.lt(direction[2]);
+    SampleLanes { direction, weight: reflectance, pdf, eta: one, exists, delta: one.lt(zero) }
 }
 
 /// f |cos| and density of a rough metal.
 #[inline(always)]
-pub(super) fn metal<L: Lanes>(f0: [L; 3], alpha: L, wo: [L; 3], wi: [L; 3]) -> ([L; 3], L) {
+pub fn metal<L: Lanes>(f0: [L; 3], alpha: L, wo: [L; 3], wi: [L; 3]) -> ([L; 3], L) {
     let zero = alpha.all(0.0);
     let ggx = Ggx::new(alpha);
     let h = add(wo, wi);
@@ -85,33 +141,45 @@ pub(super) fn metal<L: Lanes>(f0: [L; 3], alpha: L, wo: [L; 3], wi: [L; 3]) -> (
     )
 }
 
+/// Samples a rough metal.
+#[inline(always)]
+pub fn sample_metal<L: Lanes>(f0: [L; 3], alpha: L, wo: [L; 3], u: [L; 2]) -> SampleLanes<L> {
+    let (zero, one, ggx) = (alpha.all(0.0), alpha.all(1.0), Ggx::new(alpha));
+    let direction = ggx.sample_reflection(wo, u);
+    let h = add(wo, direction);
+    let reflectance = schlick(f0, dot(wo, h) / vector::length(h));
+    let weight = scale(reflectance, ggx.reflection_weight(wo, direction));
+    let (pdf, exists) = (ggx.reflection_density(wo, h), zero.lt(direction[2]));
+    SampleLanes { direction, weight, pdf, eta: one, exists, delta: one.lt(zero) }
+}
+
 /// Vertices of a block over lanes.
 #[inline(always)]
-pub(super) fn vertices<F: Load>(
-    from: F,
+pub(super) fn vertices<S: Simd>(
+    simd: S,
     surface: &SurfaceBlock,
     bsdf: &BsdfBlock,
     throughput: &Row3,
-) -> VertexLanes<F::Lanes> {
+) -> VertexLanes<S::F16> {
     VertexLanes {
-        position: from.row3(&surface.position),
-        error: from.row(&surface.error),
-        geometric_normal: from.row3(&surface.geometric_normal),
-        frame: frame(from, surface),
-        wo: from.row3(&surface.wo),
-        throughput: from.row3(throughput),
-        reflectance: from.row3(&bsdf.reflectance),
-        alpha: from.row(&bsdf.alpha),
-        diffuse: from.set(bsdf.diffuse),
-        metal: from.set(bsdf.metal),
+        position: load3(simd, &surface.position),
+        error: simd.load16(&surface.error),
+        geometric_normal: load3(simd, &surface.geometric_normal),
+        frame: load33(simd, &surface.frame),
+        wo: load3(simd, &surface.wo),
+        throughput: load3(simd, throughput),
+        reflectance: load3(simd, &bsdf.reflectance),
+        alpha: simd.load16(&bsdf.alpha),
+        diffuse: simd.mask16(bsdf.diffuse),
+        metal: simd.mask16(bsdf.metal),
     }
 }
 
-/// Shading frames of a block over lanes.
+/// Local directions to the viewers of a block, and along `direction`, over lanes.
 #[inline(always)]
-pub(super) fn frame<F: Load>(from: F, surface: &SurfaceBlock) -> [[F::Lanes; 3]; 3] {
-    let [tangent, bitangent, normal] = &surface.frame;
-    [from.row3(tangent), from.row3(bitangent), from.row3(normal)]
+pub(super) fn local<S: Simd>(simd: S, surface: &SurfaceBlock, direction: &Row3) -> [[S::F16; 3]; 2] {
+    let wi = to_local(load33(simd, &surface.frame), load3(simd, direction));
+    [viewer(load3(simd, &surface.wo)), wi]
 }
 
 /// Local direction of `direction` in the frame of `axes`.

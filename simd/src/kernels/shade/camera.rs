@@ -1,7 +1,7 @@
 //! Rays of a pinhole camera through sixteen points of the picture.
 
-use super::Row;
 use super::vector::{add, length, scale};
+use super::{Row, load2};
 use crate::lanes::{Lanes, Simd};
 use crate::level::{Kernel, Level};
 
@@ -35,22 +35,11 @@ fn direction<L: Lanes>(camera: &CameraRays, axes: [[L; 3]; 3], [x, y]: [L; 2]) -
 impl CameraRays<'_> {
     /// Rays by the instructions of `level`, into `rays`: origin, infinity, unit direction, zero.
     pub fn compute(&self, level: Level, rays: &mut [[f32; 8]; 16]) {
-        level.dispatch(CameraKernel(self, rays));
-    }
-
-    /// Scalar reference; equals [`CameraRays::compute`] to the bit.
-    pub fn reference(&self) -> [[f32; 8]; 16] {
-        let [ex, ey, ez] = self.eye;
-        core::array::from_fn(|i| {
-            let [x, y, z] = direction(self, self.axes, [self.raster[0][i], self.raster[1][i]]);
-            [ex, ey, ez, f32::INFINITY, x, y, z, 0.0]
-        })
+        level.dispatch((self, rays));
     }
 }
 
-struct CameraKernel<'k, 'b>(&'k CameraRays<'b>, &'k mut [[f32; 8]; 16]);
-
-impl Kernel for CameraKernel<'_, '_> {
+impl Kernel for (&CameraRays<'_>, &mut [[f32; 8]; 16]) {
     type Out = ();
 
     #[inline(always)]
@@ -63,7 +52,7 @@ impl Kernel for CameraKernel<'_, '_> {
             [all(forward[0]), all(forward[1]), all(forward[2])],
         ];
         let raster = self.0.raster;
-        let [x, y, z] = direction(self.0, axes, [simd.load16(&raster[0]), simd.load16(&raster[1])]);
+        let [x, y, z] = direction(self.0, axes, load2(simd, raster));
         let [ex, ey, ez] = self.0.eye;
         let (end, zero) = (all(f32::INFINITY), all(0.0));
         simd.octets16([all(ex), all(ey), all(ez), end, x, y, z, zero], self.1);

@@ -2,7 +2,6 @@
 //! the number that chooses is rescaled, for the choice within the group.
 
 use super::Row;
-use super::load::{All, Load, One};
 use crate::lanes::{Lanes, Mask, Simd};
 use crate::level::{Kernel, Level};
 
@@ -101,36 +100,21 @@ impl ChoiceBlock {
 impl Choices<'_> {
     /// Groups by the instructions of `level`, into `block`.
     pub fn compute(&self, level: Level, block: &mut ChoiceBlock) {
-        level.dispatch(ChoiceKernel(self, block));
+        level.dispatch((self, block));
     }
 
     /// Groups by the lanes of `simd`, into `block`, in a kernel of the caller.
     #[inline(always)]
     pub fn in_lanes<S: Simd>(&self, simd: S, block: &mut ChoiceBlock) {
-        let chosen = choose(simd.columns16(self.weights), All(simd).row(self.u));
+        let chosen = choose(simd.columns16(self.weights), simd.load16(self.u));
         block.group = chosen.group.to_array();
         block.probability = chosen.probability.to_array();
         block.rest = chosen.rest.to_array();
         block.exists = chosen.exists.bits();
     }
-
-    /// Scalar reference; equals [`Choices::compute`] to the bit where groups exist.
-    pub fn reference(&self) -> ChoiceBlock {
-        let mut block = ChoiceBlock::EMPTY;
-        for (i, weights) in self.weights.iter().enumerate() {
-            let chosen = choose(*weights, One(i).row(self.u));
-            block.group[i] = chosen.group;
-            block.probability[i] = chosen.probability;
-            block.rest[i] = chosen.rest;
-            block.exists |= u32::from(chosen.exists) << i;
-        }
-        block
-    }
 }
 
-struct ChoiceKernel<'k, 'b>(&'k Choices<'b>, &'k mut ChoiceBlock);
-
-impl Kernel for ChoiceKernel<'_, '_> {
+impl Kernel for (&Choices<'_>, &mut ChoiceBlock) {
     type Out = ();
 
     #[inline(always)]
@@ -165,7 +149,8 @@ mod tests {
                 1 => BELOW_ONE,
                 _ => unit_float((mix(round << 24 | i as u64) >> 32) as u32),
             });
-            let wanted = Choices { weights: &weights, u: &u }.reference();
+            let mut wanted = ChoiceBlock::EMPTY;
+            Choices { weights: &weights, u: &u }.compute(Level::SCALAR, &mut wanted);
             for i in 0..16 {
                 let positive = weights[i].iter().any(|weight| *weight > 0.0);
                 assert_eq!(wanted.exists >> i & 1 == 1, positive);

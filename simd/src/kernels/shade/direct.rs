@@ -3,14 +3,12 @@
 //!
 //! Values of BSDFs without lanes come from the caller.
 
-use super::bsdf::{BsdfBlock, VertexLanes, metal, vertices};
-use super::load::{All, Load, One};
+use super::bsdf::{BsdfBlock, VertexLanes, diffuse, metal, to_local, vertices};
 use super::surface::SurfaceBlock;
 use super::vector::{self, mul, scale, sub};
-use super::{Row, Row3};
+use super::{Row, Row3, load3};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
-use core::f32::consts::FRAC_1_PI;
 
 /// Largest `t` of a ray whose direction has its length: just below 1, the `t` of its target.
 pub const BOUNDED: f32 = 1.0 - f32::EPSILON;
@@ -104,17 +102,17 @@ pub(super) struct LightLanes<L: Lanes> {
 impl<L: Lanes> LightLanes<L> {
     /// Light samples of a block.
     #[inline(always)]
-    pub(super) fn of<F: Load<Lanes = L>>(from: F, light: &LightBlock) -> Self {
+    pub(super) fn of<S: Simd<F16 = L>>(simd: S, light: &LightBlock) -> Self {
         Self {
-            direction: from.row3(&light.direction),
-            end: from.row3(&light.end),
-            pdf: from.row(&light.pdf),
-            radiance: from.row3(&light.radiance),
-            exists: from.set(light.exists),
-            bounded: from.set(light.bounded),
-            area: from.set(light.area),
-            alone: from.set(light.alone),
-            balance: from.set(light.balance),
+            direction: load3(simd, &light.direction),
+            end: load3(simd, &light.end),
+            pdf: simd.load16(&light.pdf),
+            radiance: load3(simd, &light.radiance),
+            exists: simd.mask16(light.exists),
+            bounded: simd.mask16(light.bounded),
+            area: simd.mask16(light.area),
+            alone: simd.mask16(light.alone),
+            balance: simd.mask16(light.balance),
         }
     }
 
@@ -147,13 +145,10 @@ fn reach<L: Lanes>(
 ) -> (ShadowLanes<L>, L) {
     let (zero, (value, density)) = (given.1.all(0.0), given);
     let direction = light.direction;
-    let [tangent, bitangent, normal] = vertex.frame;
-    let wi = [dot(direction, tangent), dot(direction, bitangent), dot(direction, normal)];
-    let lambert = wi[2].max(zero) * zero.all(FRAC_1_PI);
-    let (mut value, mut density) = (
-        vector::select(vertex.diffuse, scale(vertex.reflectance, lambert), value),
-        lambert.select(vertex.diffuse, density),
-    );
+    let wi = to_local(vertex.frame, direction);
+    let (f, pdf) = diffuse(vertex.reflectance, wi);
+    let mut value = vector::select(vertex.diffuse, f, value);
+    let mut density = pdf.select(vertex.diffuse, density);
     if (vertex.metal & light.exists).any() {
         let (f, pdf) = metal(vertex.reflectance, vertex.alpha, vertex.viewer(), wi);
         value = vector::select(vertex.metal, f, value);
@@ -188,18 +183,6 @@ fn direct<L: Lanes>(
 }
 
 impl Direct<'_> {
-    /// Shadow rays over lanes, with their contributions, or with f |cos| and the density if `REACH`.
-    #[inline(always)]
-    fn at<F: Load, const REACH: bool>(&self, from: F) -> (ShadowLanes<F::Lanes>, F::Lanes) {
-        let light = LightLanes::of(from, self.light);
-        let vertex = vertices(from, self.surface, self.bsdf, self.throughput);
-        let (given, each) = ((from.row3(self.value), from.row(self.pdf)), from.row(self.each));
-        match REACH {
-            true => reach(&vertex, &light, given),
-            false => (direct(&vertex, &light, given, each), each.all(0.0)),
-        }
-    }
-
     /// Shadow rays by the instructions of `level`, into `block`.
     pub fn compute(&self, level: Level, block: &mut ShadowBlock) {
         level.dispatch(DirectKernel::<false>(self, block));
@@ -210,28 +193,6 @@ impl Direct<'_> {
     pub fn reach(&self, level: Level, block: &mut ShadowBlock) {
         level.dispatch(DirectKernel::<true>(self, block));
     }
-
-    /// Scalar reference; equals [`Direct::compute`] to the bit in lanes that exist.
-    pub fn reference(&self) -> ShadowBlock {
-        self.each_lane::<false>()
-    }
-
-    /// Scalar reference; equals [`Direct::reach`] to the bit in lanes that exist.
-    pub fn reach_reference(&self) -> ShadowBlock {
-        self.each_lane::<true>()
-    }
-
-    fn each_lane<const REACH: bool>(&self) -> ShadowBlock {
-        let mut block = ShadowBlock::EMPTY;
-        for i in 0..super::BLOCK {
-            let (ray, last) = self.at::<_, REACH>(One(i));
-            let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
-            block.rays[i] = [ox, oy, oz, ray.end, dx, dy, dz, 0.0];
-            block.contribution[i] = [r, g, b, last];
-            block.exists |= u32::from(ray.exists) << i;
-        }
-        block
-    }
 }
 
 struct DirectKernel<'k, 'b, const REACH: bool>(&'k Direct<'b>, &'k mut ShadowBlock);
@@ -241,9 +202,14 @@ impl<const REACH: bool> Kernel for DirectKernel<'_, '_, REACH> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let (ray, last) = self.0.at::<_, REACH>(All(simd));
+        let Self(Direct { surface, bsdf, light, value, pdf, each, throughput }, block) = self;
+        let (vertex, light) = (vertices(simd, surface, bsdf, throughput), LightLanes::of(simd, light));
+        let (given, each) = ((load3(simd, value), simd.load16(pdf)), simd.load16(each));
+        let (ray, last) = match REACH {
+            true => reach(&vertex, &light, given),
+            false => (direct(&vertex, &light, given, each), simd.splat16(0.0)),
+        };
         let ([ox, oy, oz], [dx, dy, dz], [r, g, b]) = (ray.origin, ray.direction, ray.contribution);
-        let block = self.1;
         simd.octets16([ox, oy, oz, ray.end, dx, dy, dz, simd.splat16(0.0)], &mut block.rays);
         block.contribution = simd.records16([r, g, b, last]);
         block.exists = ray.exists.bits();

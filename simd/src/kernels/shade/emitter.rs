@@ -4,7 +4,7 @@
 use super::rectangle::SphericalRectangle;
 use super::triangle::SphericalTriangle;
 use super::vector::{self, add, scale, sub};
-use super::{Row, Row3, at, load3, put, warp};
+use super::{Row, Row3, load2, load3, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 
@@ -174,36 +174,7 @@ pub fn sample<L: Lanes>(
 impl EmitterSamples<'_> {
     /// Samples by the instructions of `level`.
     pub fn compute(&self, level: Level) -> EmitterSampleBlock {
-        level.dispatch(SampleKernel(self))
-    }
-
-    /// Scalar reference; equals [`EmitterSamples::compute`] to the bit in lanes that exist.
-    pub fn reference(&self) -> EmitterSampleBlock {
-        let mut block = EmitterSampleBlock::EMPTY;
-        let EmitterSamples { lights, .. } = self;
-        for i in 0..super::BLOCK {
-            let bit = |bits: u32| bits >> i & 1 == 1;
-            let light = EmitterLanes {
-                origin: at(&lights.origin, i),
-                edges: [at(&lights.edges[0], i), at(&lights.edges[1], i)],
-                normal: at(&lights.normal, i),
-                area: lights.area[i],
-                near: lights.near[i],
-                triangles: bit(lights.triangles),
-                rectangles: bit(lights.rectangles),
-                two_sided: bit(lights.two_sided),
-            };
-            let u = [self.u[0][i], self.u[1][i]];
-            let active = bit(self.active);
-            let sample = sample(&light, at(self.from, i), at(self.normal, i), u, self.probability[i], active);
-            put(&mut block.end, i, sample.end);
-            put(&mut block.direction, i, sample.direction);
-            (block.distance[i], block.pdf[i]) = (sample.distance, sample.pdf);
-            block.exists |= u32::from(sample.exists) << i;
-            block.front |= u32::from(sample.front) << i;
-            block.second |= u32::from(sample.second) << i;
-        }
-        block
+        level.dispatch(self)
     }
 }
 
@@ -220,14 +191,12 @@ impl EmitterSampleBlock {
     };
 }
 
-struct SampleKernel<'k, 'b>(&'k EmitterSamples<'b>);
-
-impl Kernel for SampleKernel<'_, '_> {
+impl Kernel for &EmitterSamples<'_> {
     type Out = EmitterSampleBlock;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> EmitterSampleBlock {
-        let EmitterSamples { lights, from, normal, u, probability, active } = self.0;
+        let EmitterSamples { lights, from, normal, u, probability, active } = self;
         let light = EmitterLanes {
             origin: load3(simd, &lights.origin),
             edges: [load3(simd, &lights.edges[0]), load3(simd, &lights.edges[1])],
@@ -238,10 +207,9 @@ impl Kernel for SampleKernel<'_, '_> {
             rectangles: simd.mask16(lights.rectangles),
             two_sided: simd.mask16(lights.two_sided),
         };
-        let u = [simd.load16(&u[0]), simd.load16(&u[1])];
-        let (from, normal) = (load3(simd, from), load3(simd, normal));
-        let probability = simd.load16(probability);
-        let sample = sample(&light, from, normal, u, probability, simd.mask16(*active));
+        let (from, normal, u) = (load3(simd, from), load3(simd, normal), load2(simd, u));
+        let (probability, active) = (simd.load16(probability), simd.mask16(*active));
+        let sample = sample(&light, from, normal, u, probability, active);
         EmitterSampleBlock {
             end: vector::to_arrays(sample.end),
             direction: vector::to_arrays(sample.direction),

@@ -1,20 +1,21 @@
 //! Shading of blocks of sixteen vertices, in structures of arrays: random numbers, surface points, samples of
 //! area lights, choices among groups of lights, BSDFs, and camera rays.
 //!
-//! A kernel is a function over lanes, which one f32 implements as well: with f32 it is the scalar reference,
-//! and every level gives its bits. Lanes without a vertex hold any values; their results are ignored.
+//! A formula is a function over lanes, which one f32 implements as well: the core shades single vertices by
+//! it, and every level gives the same bits. Lanes without a vertex hold any values; their results are not
+//! used.
 
 pub mod bsdf;
 pub mod camera;
 pub mod choice;
 pub mod coat;
 pub mod coat_apart;
+pub mod coat_lanes;
 pub mod coat_tables;
 pub mod direct;
 pub mod emitter;
-mod fresnel;
+pub mod fresnel;
 pub mod ggx;
-mod load;
 pub mod numbers;
 pub mod rectangle;
 pub mod rough;
@@ -55,6 +56,18 @@ pub const fn put(rows: &mut Row3, i: usize, [x, y, z]: [f32; 3]) {
     rows[0][i & 15] = x;
     rows[1][i & 15] = y;
     rows[2][i & 15] = z;
+}
+
+/// Lanes of the axes of frames, or of other triples of vectors, from memory.
+#[inline(always)]
+fn load33<S: Simd>(simd: S, [a, b, c]: &[Row3; 3]) -> [[S::F16; 3]; 3] {
+    [load3(simd, a), load3(simd, b), load3(simd, c)]
+}
+
+/// Lanes of a point of the unit square from memory.
+#[inline(always)]
+fn load2<S: Simd>(simd: S, [u, v]: &[Row; 2]) -> [S::F16; 2] {
+    [simd.load16(u), simd.load16(v)]
 }
 
 /// Lanes of a vector from memory.

@@ -214,22 +214,6 @@ impl SampleBlock {
         level.dispatch(Scattering(self, offsets, out));
     }
 
-    /// Scalar reference; equals [`SampleBlock::vertices`] to the bit.
-    pub fn reference(&self, offsets: Offsets, chooses: bool) -> VertexNumbers {
-        let mut out = VertexNumbers::EMPTY;
-        for i in 0..BLOCK {
-            let (key, first) = (place_key(self.place[i]), self.dimension[i]);
-            let index = self.index[i].reverse_bits();
-            [out.light[0][i], out.light[1][i]] = pair(key, index, first.wrapping_add(offsets.light));
-            [out.scatter[0][i], out.scatter[1][i]] = pair(key, index, first.wrapping_add(offsets.scatter));
-            out.roulette[i] = single(key, index, first.wrapping_add(offsets.roulette));
-            if chooses {
-                out.choice[i] = single(key, index, first.wrapping_add(offsets.choice));
-            }
-        }
-        out
-    }
-
     /// Pairs of numbers at one dimension.
     pub fn pairs(&self, level: Level, dimension: u32) -> [Row; 2] {
         level.dispatch(Pairs::<false>(self, dimension))
@@ -327,6 +311,20 @@ impl<const SECOND: bool> Kernel for Pairs<'_, SECOND> {
 mod tests {
     use super::*;
 
+    /// Numbers of the vertices one by one.
+    fn one_by_one(samples: &SampleBlock, offsets: Offsets) -> VertexNumbers {
+        let mut out = VertexNumbers::EMPTY;
+        for i in 0..BLOCK {
+            let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
+            let index = samples.index[i].reverse_bits();
+            [out.light[0][i], out.light[1][i]] = pair(key, index, first + offsets.light);
+            [out.scatter[0][i], out.scatter[1][i]] = pair(key, index, first + offsets.scatter);
+            out.roulette[i] = single(key, index, first + offsets.roulette);
+            out.choice[i] = single(key, index, first + offsets.choice);
+        }
+        out
+    }
+
     #[test]
     fn numbers_have_the_bits_of_single_samples_on_every_level() {
         let mut samples = SampleBlock::EMPTY;
@@ -337,7 +335,7 @@ mod tests {
                 samples.index[i] = mix(round << 16 | i as u64) as u32 >> (round % 32);
                 samples.dimension[i] = 2 + 5 * (round as u32 % 7 + i as u32);
             }
-            let wanted = samples.reference(offsets, true);
+            let wanted = one_by_one(&samples, offsets);
             for level in Level::detect().and_below() {
                 let (mut found, mut plain) = (VertexNumbers::EMPTY, VertexNumbers::EMPTY);
                 let mut lights = VertexNumbers::EMPTY;

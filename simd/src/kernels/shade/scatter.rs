@@ -2,16 +2,12 @@
 //!
 //! Samples of BSDFs without lanes come from the caller.
 
-use super::bsdf::{BsdfBlock, VertexLanes, vertices};
-use super::fresnel::schlick;
-use super::ggx::Ggx;
-use super::load::{All, Load, One};
+use super::bsdf::{BsdfBlock, SampleLanes, VertexLanes, sample_diffuse, sample_metal, vertices};
 use super::surface::SurfaceBlock;
-use super::vector::{self, add, divide, mul, scale};
-use super::{Row, Row3, put, warp};
-use crate::lanes::{Lanes, Mask, Simd, dot};
+use super::vector::{self, divide, mul, scale};
+use super::{Row, Row3, load2, load3, warp};
+use crate::lanes::{Lanes, Mask, Simd};
 use crate::level::{Kernel, Level};
-use core::f32::consts::FRAC_1_PI;
 
 /// Throughput from which a path survives with certainty; below, the probability is proportional to it. There
 /// is no minimum number of segments: early ends of dark paths save the most time
@@ -62,6 +58,22 @@ impl ScatterBlock {
     /// Zeros.
     pub const EMPTY: Self =
         Self { direction: [[0.0; 16]; 3], weight: [[0.0; 16]; 3], pdf: [0.0; 16], eta: [1.0; 16] };
+
+    /// Stores the samples of the lanes `of`.
+    #[inline(always)]
+    pub(super) fn set<S: Simd>(
+        &mut self,
+        simd: S,
+        of: <S::F16 as Lanes>::Mask,
+        sample: &SampleLanes<S::F16>,
+    ) {
+        let (direction, weight) = (load3(simd, &self.direction), load3(simd, &self.weight));
+        let pdf = simd.splat16(f32::INFINITY).select(sample.delta, sample.pdf);
+        self.direction = vector::to_arrays(vector::select(of, sample.direction, direction));
+        self.weight = vector::to_arrays(vector::select(of, sample.weight, weight));
+        self.pdf = pdf.select(of, simd.load16(&self.pdf)).to_array();
+        self.eta = sample.eta.select(of, simd.load16(&self.eta)).to_array();
+    }
 }
 
 /// Next rays of a block.
@@ -93,16 +105,12 @@ impl NextBlock {
 
 /// Inputs of [`scatter`] over lanes.
 struct ScatterLanes<L: Lanes> {
-    direction: [L; 3],
-    weight: [L; 3],
-    pdf: L,
-    eta: L,
+    given: SampleLanes<L>,
     u: [L; 2],
     roulette: L,
     most: L,
     factor: [L; 3],
     eta_squared: L,
-    active: L::Mask,
     certain: L::Mask,
 }
 
@@ -117,53 +125,27 @@ struct NextLanes<L: Lanes> {
     exists: L::Mask,
 }
 
-/// Samples of BSDFs over lanes: local directions, f |cos| / pdf, and densities.
-struct SampleLanes<L: Lanes> {
-    local: [L; 3],
-    weight: [L; 3],
-    pdf: L,
-    exists: L::Mask,
-}
-
-impl<L: Lanes> ScatterLanes<L> {
-    /// The given samples.
-    #[inline(always)]
-    fn samples(&self) -> SampleLanes<L> {
-        SampleLanes { local: self.direction, weight: self.weight, pdf: self.pdf, exists: self.active }
-    }
-}
-
 /// Samples diffuse surfaces and rough metals at `u`; `given` is the sample of the others.
 #[inline(always)]
 fn sample<L: Lanes>(vertex: &VertexLanes<L>, u: [L; 2], given: SampleLanes<L>) -> SampleLanes<L> {
-    let (zero, active) = (u[0].all(0.0), given.exists);
-    let lambert = warp::cosine_hemisphere(u);
-    let mut local = vector::select(vertex.diffuse, lambert, given.local);
-    let mut weight = vector::select(vertex.diffuse, vertex.reflectance, given.weight);
-    let mut pdf = (lambert[2] * zero.all(FRAC_1_PI)).select(vertex.diffuse, given.pdf);
-    let mut exists = active;
-    let is_metal = vertex.metal & active;
+    let lambert = sample_diffuse(vertex.reflectance, u);
+    let mut sample = SampleLanes { eta: given.eta, ..lambert.select(vertex.diffuse, given) };
+    let is_metal = vertex.metal & given.exists;
     if is_metal.any() {
-        let (ggx, wo) = (Ggx::new(vertex.alpha), vertex.viewer());
-        let wi = ggx.sample_reflection(wo, u);
-        let h = add(wo, wi);
-        let reflectance = schlick(vertex.reflectance, dot(wo, h) / vector::length(h));
-        local = vector::select(is_metal, wi, local);
-        weight = vector::select(is_metal, scale(reflectance, ggx.reflection_weight(wo, wi)), weight);
-        pdf = ggx.reflection_density(wo, h).select(is_metal, pdf);
-        exists = exists & (!is_metal | zero.lt(wi[2]));
+        let metal = sample_metal(vertex.reflectance, vertex.alpha, vertex.viewer(), u);
+        sample = SampleLanes { eta: given.eta, ..metal.select(is_metal, sample) };
     }
-    SampleLanes { local, weight, pdf, exists }
+    SampleLanes { exists: given.exists & sample.exists, ..sample }
 }
 
 /// Samples BSDFs and plays roulette.
 #[inline(always)]
 fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLanes<L> {
-    let (zero, one) = (given.pdf.all(0.0), given.pdf.all(1.0));
-    let SampleLanes { local, weight, pdf, exists } = sample(vertex, given.u, given.samples());
+    let (zero, one) = (given.most.all(0.0), given.most.all(1.0));
+    let SampleLanes { direction: local, weight, pdf, eta, exists, .. } = sample(vertex, given.u, given.given);
     let direction = warp::to_world(vertex.frame, local);
     let throughput = mul(vertex.throughput, weight);
-    let eta_squared = given.eta_squared * (given.eta * given.eta);
+    let eta_squared = given.eta_squared * (eta * eta);
     let bright = vector::largest(scale(mul(throughput, given.factor), eta_squared)) / zero.all(CERTAIN_FROM);
     let survival = bright.min(given.most);
     let is_certain = given.certain | !survival.lt(one);
@@ -179,89 +161,47 @@ fn scatter<L: Lanes>(vertex: &VertexLanes<L>, given: &ScatterLanes<L>) -> NextLa
 impl Scatter<'_> {
     /// Vertices and inputs over lanes.
     #[inline(always)]
-    fn load<F: Load>(&self, from: F) -> (VertexLanes<F::Lanes>, ScatterLanes<F::Lanes>) {
-        let given = ScatterLanes {
-            direction: from.row3(&self.given.direction),
-            weight: from.row3(&self.given.weight),
-            pdf: from.row(&self.given.pdf),
-            eta: from.row(&self.given.eta),
-            u: [from.row(&self.u[0]), from.row(&self.u[1])],
-            roulette: from.row(self.roulette),
-            most: from.row(self.most),
-            factor: from.row3(self.factor),
-            eta_squared: from.row(self.eta_squared),
-            active: from.set(self.active),
-            certain: from.set(self.certain),
+    fn load<S: Simd>(&self, simd: S) -> (VertexLanes<S::F16>, ScatterLanes<S::F16>) {
+        let given = SampleLanes {
+            direction: load3(simd, &self.given.direction),
+            weight: load3(simd, &self.given.weight),
+            pdf: simd.load16(&self.given.pdf),
+            eta: simd.load16(&self.given.eta),
+            exists: simd.mask16(self.active),
+            delta: simd.mask16(0),
         };
-        (vertices(from, self.surface, self.bsdf, self.throughput), given)
-    }
-
-    /// Next rays over lanes, and their vertices.
-    #[inline(always)]
-    fn at<F: Load>(&self, from: F) -> (NextLanes<F::Lanes>, VertexLanes<F::Lanes>) {
-        let (vertex, given) = self.load(from);
-        (scatter(&vertex, &given), vertex)
-    }
-
-    /// Samples over lanes.
-    #[inline(always)]
-    fn sample<F: Load>(&self, from: F) -> SampleLanes<F::Lanes> {
-        let (vertex, given) = self.load(from);
-        sample(&vertex, given.u, given.samples())
+        let inputs = ScatterLanes {
+            given,
+            u: load2(simd, self.u),
+            roulette: simd.load16(self.roulette),
+            most: simd.load16(self.most),
+            factor: load3(simd, self.factor),
+            eta_squared: simd.load16(self.eta_squared),
+            certain: simd.mask16(self.certain),
+        };
+        (vertices(simd, self.surface, self.bsdf, self.throughput), inputs)
     }
 
     /// Samples of all BSDFs by the instructions of `level`, without roulette: for walks with other weights.
     /// Returns the set of samples as well.
     #[must_use]
     pub fn samples(&self, level: Level) -> (ScatterBlock, u32) {
-        level.dispatch(SamplesKernel(self))
-    }
-
-    /// Scalar reference; equals [`Scatter::samples`] to the bit in lanes that exist.
-    #[must_use]
-    pub fn samples_reference(&self) -> (ScatterBlock, u32) {
-        let (mut block, mut exists) = (self.given.clone(), 0);
-        for i in 0..super::BLOCK {
-            let sample = self.sample(One(i));
-            put(&mut block.direction, i, sample.local);
-            put(&mut block.weight, i, sample.weight);
-            block.pdf[i] = sample.pdf;
-            exists |= u32::from(sample.exists) << i;
-        }
-        (block, exists)
+        level.dispatch(self)
     }
 
     /// Next rays by the instructions of `level`, into `block`.
     pub fn compute(&self, level: Level, block: &mut NextBlock) {
-        level.dispatch(ScatterKernel(self, block));
-    }
-
-    /// Scalar reference; equals [`Scatter::compute`] to the bit in lanes that exist.
-    pub fn reference(&self) -> NextBlock {
-        let mut block = NextBlock::EMPTY;
-        for i in 0..super::BLOCK {
-            let (next, vertex) = self.at(One(i));
-            let ([ox, oy, oz], [dx, dy, dz]) = (next.origin, next.direction);
-            block.rays[i] = [ox, oy, oz, f32::INFINITY, dx, dy, dz, 0.0];
-            let ([r, g, b], [x, y, z]) = (next.throughput, vertex.position);
-            block.states[i] = [r, g, b, next.pdf, x, y, z, next.eta_squared];
-            let [nx, ny, nz] = vertex.frame[2];
-            block.normals[i] = [nx, ny, nz, 0.0];
-            put(&mut block.local, i, next.local);
-            block.exists |= u32::from(next.exists) << i;
-        }
-        block
+        level.dispatch((self, block));
     }
 }
 
-struct ScatterKernel<'k, 'b>(&'k Scatter<'b>, &'k mut NextBlock);
-
-impl Kernel for ScatterKernel<'_, '_> {
+impl Kernel for (&Scatter<'_>, &mut NextBlock) {
     type Out = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let (next, vertex) = self.0.at(All(simd));
+        let (vertex, inputs) = self.0.load(simd);
+        let next = scatter(&vertex, &inputs);
         let (zero, end) = (simd.splat16(0.0), simd.splat16(f32::INFINITY));
         let ([ox, oy, oz], [dx, dy, dz]) = (next.origin, next.direction);
         let ([r, g, b], [x, y, z]) = (next.throughput, vertex.position);
@@ -275,19 +215,18 @@ impl Kernel for ScatterKernel<'_, '_> {
     }
 }
 
-struct SamplesKernel<'k, 'b>(&'k Scatter<'b>);
-
-impl Kernel for SamplesKernel<'_, '_> {
+impl Kernel for &Scatter<'_> {
     type Out = (ScatterBlock, u32);
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> (ScatterBlock, u32) {
-        let sample = self.0.sample(All(simd));
+        let (vertex, inputs) = self.load(simd);
+        let sample = sample(&vertex, inputs.u, inputs.given);
         let block = ScatterBlock {
-            direction: vector::to_arrays(sample.local),
+            direction: vector::to_arrays(sample.direction),
             weight: vector::to_arrays(sample.weight),
             pdf: sample.pdf.to_array(),
-            eta: self.0.given.eta,
+            eta: self.given.eta,
         };
         (block, sample.exists.bits())
     }

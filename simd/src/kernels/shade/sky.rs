@@ -3,7 +3,7 @@
 
 use super::vector::{self, add, scale};
 use super::warp::{self, sin_cos_turns};
-use super::{Row, Row3, at, load3, put};
+use super::{Row, Row3, load2, load3};
 use crate::lanes::{Lanes, Mask, Simd};
 use crate::level::{Kernel, Level};
 use core::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -96,39 +96,19 @@ fn sample<L: Lanes>(
 impl SkySamples<'_> {
     /// Directions and densities by the instructions of `level`, into the lanes of samples. Returns their set.
     pub fn compute(&self, level: Level, direction: &mut Row3, pdf: &mut Row) -> u32 {
-        level.dispatch(SkyKernel(self, direction, pdf))
-    }
-
-    /// Scalar reference; equals [`SkySamples::compute`] to the bit.
-    pub fn reference(&self, direction: &mut Row3, pdf: &mut Row) -> u32 {
-        let Self { sky, to_world, active } = self;
-        let mut set = 0;
-        for i in (0..super::BLOCK).filter(|i| active >> i & 1 == 1) {
-            let places = [sky.at[0][i], sky.at[1][i]];
-            let factors = [sky.factors[0][i], sky.factors[1][i]];
-            let found = sample(*to_world, places, sky.density[i], at(&sky.normal, i), factors);
-            if found.exists {
-                put(direction, i, found.direction);
-                pdf[i] = found.pdf;
-                set |= 1 << i;
-            }
-        }
-        set
+        level.dispatch((self, direction, pdf))
     }
 }
 
-struct SkyKernel<'k, 'b>(&'k SkySamples<'b>, &'k mut Row3, &'k mut Row);
-
-impl Kernel for SkyKernel<'_, '_> {
+impl Kernel for (&SkySamples<'_>, &mut Row3, &mut Row) {
     type Out = u32;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u32 {
-        let Self(SkySamples { sky, to_world, active }, direction, pdf) = self;
+        let (SkySamples { sky, to_world, active }, direction, pdf) = self;
         let splat = |[x, y, z]: [f32; 3]| [simd.splat16(x), simd.splat16(y), simd.splat16(z)];
         let map = to_world.map(|[x, y, z]| [splat(x), splat(y), splat(z)]);
-        let places = [simd.load16(&sky.at[0]), simd.load16(&sky.at[1])];
-        let factors = [simd.load16(&sky.factors[0]), simd.load16(&sky.factors[1])];
+        let (places, factors) = (load2(simd, &sky.at), load2(simd, &sky.factors));
         let found = sample(map, places, simd.load16(&sky.density), load3(simd, &sky.normal), factors);
         let exists = found.exists & simd.mask16(*active);
         *direction = vector::to_arrays(vector::select(exists, found.direction, load3(simd, direction)));

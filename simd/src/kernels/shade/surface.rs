@@ -1,7 +1,7 @@
 //! Surface points of a block: interpolated position with its error bound, geometric normal, shading frame.
 
 use super::vector::{self, add, cross, negate, scale, sub};
-use super::{Row, Row3, at, load3, put, warp};
+use super::{Row, Row3, load2, load33, warp};
 use crate::lanes::{Lanes, Mask, Simd, dot};
 use crate::level::{Kernel, Level};
 
@@ -127,30 +127,7 @@ pub fn surface<L: Lanes>(
 impl Surfaces<'_> {
     /// Surface points by the instructions of `level`, into `block`.
     pub fn compute(&self, level: Level, block: &mut SurfaceBlock) {
-        level.dispatch(SurfaceKernel(self, block));
-    }
-
-    /// Scalar reference; equals [`Surfaces::compute`] to the bit.
-    pub fn reference(&self) -> SurfaceBlock {
-        let mut block = SurfaceBlock::EMPTY;
-        for i in 0..super::BLOCK {
-            let point = surface(
-                [at(&self.corners[0], i), at(&self.corners[1], i), at(&self.corners[2], i)],
-                self.normals.map(|n| [at(&n[0], i), at(&n[1], i), at(&n[2], i)]),
-                [self.weights[0][i], self.weights[1][i]],
-                [self.rays[i][4], self.rays[i][5], self.rays[i][6]],
-            );
-            put(&mut block.position, i, point.position);
-            put(&mut block.geometric_normal, i, point.geometric_normal);
-            put(&mut block.wo, i, point.wo);
-            for (rows, axis) in block.frame.iter_mut().zip(point.frame) {
-                put(rows, i, axis);
-            }
-            block.error[i] = point.error;
-            block.front |= u32::from(point.front) << i;
-            block.regular |= u32::from(point.regular) << i;
-        }
-        block
+        level.dispatch((self, block));
     }
 }
 
@@ -167,22 +144,15 @@ impl SurfaceBlock {
     };
 }
 
-struct SurfaceKernel<'k, 'b>(&'k Surfaces<'b>, &'k mut SurfaceBlock);
-
-impl Kernel for SurfaceKernel<'_, '_> {
+impl Kernel for (&Surfaces<'_>, &mut SurfaceBlock) {
     type Out = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Surfaces { corners, normals, weights, rays } = self.0;
         let [.., x, y, z, _] = simd.columns16(rays);
-        let three = |rows: &[Row3; 3]| [load3(simd, &rows[0]), load3(simd, &rows[1]), load3(simd, &rows[2])];
-        let point = surface(
-            three(corners),
-            normals.map(three),
-            [simd.load16(&weights[0]), simd.load16(&weights[1])],
-            [x, y, z],
-        );
+        let normals = normals.map(|normals| load33(simd, normals));
+        let point = surface(load33(simd, corners), normals, load2(simd, weights), [x, y, z]);
         let [tangent, bitangent, normal] = point.frame;
         let block = self.1;
         block.position = vector::to_arrays(point.position);

@@ -1,9 +1,9 @@
-//! Kernels against their scalar references, to the bit in the lanes that exist, on every level.
+//! Kernels on every level against the same kernels by single f32 lanes, to the bit in the lanes that exist.
 
 use super::bsdf::BsdfBlock;
 use super::camera::CameraRays;
-use super::coat::{CoatBlock, CoatLight, CoatSamples};
-use super::coat_apart::{ApartBlock, ApartLight, ApartSets};
+use super::coat::{CoatBlock, CoatLight, CoatSamples, CoatSets};
+use super::coat_apart::{ApartBlock, ApartLight};
 use super::coat_tables::CoatTables;
 use super::direct::{Direct, LightBlock, ShadowBlock};
 use super::emitter::{EmitterBlock, EmitterSamples};
@@ -53,6 +53,12 @@ impl Random {
     }
 }
 
+/// Result of a kernel at `level`, written to `out`.
+fn by<T>(level: Level, mut out: T, compute: impl Fn(Level, &mut T)) -> T {
+    compute(level, &mut out);
+    out
+}
+
 fn bits3(rows: &Row3, i: usize) -> [u32; 3] {
     at(rows, i).map(f32::to_bits)
 }
@@ -91,7 +97,7 @@ fn emitters(random: &mut Random) -> EmitterBlock {
 }
 
 #[test]
-fn surface_points_agree_with_the_reference_on_every_level() {
+fn surface_points_are_the_same_on_every_level() {
     let mut random = Random(1);
     for round in 0..400 {
         let corners = [random.vectors(), random.vectors(), random.vectors()];
@@ -104,10 +110,9 @@ fn surface_points_agree_with_the_reference_on_every_level() {
         });
         let normals = (round % 2 == 0).then_some(&normals);
         let surfaces = Surfaces { corners: &corners, normals, weights: &weights, rays: &rays };
-        let wanted = surfaces.reference();
+        let wanted = by(Level::SCALAR, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block));
         for level in Level::detect().and_below() {
-            let mut found = SurfaceBlock::EMPTY;
-            surfaces.compute(level, &mut found);
+            let found = by(level, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block));
             assert_eq!((found.front, found.regular), (wanted.front, wanted.regular), "{level:?}");
             for i in lanes(wanted.regular) {
                 let all = |block: &super::surface::SurfaceBlock| {
@@ -122,7 +127,7 @@ fn surface_points_agree_with_the_reference_on_every_level() {
 }
 
 #[test]
-fn light_samples_agree_with_the_reference_on_every_level() {
+fn light_samples_are_the_same_on_every_level() {
     let mut random = Random(2);
     let mut count = 0;
     for _ in 0..400 {
@@ -139,7 +144,7 @@ fn light_samples_agree_with_the_reference_on_every_level() {
             probability: &probability,
             active,
         };
-        let wanted = samples.reference();
+        let wanted = samples.compute(Level::SCALAR);
         count += wanted.exists.count_ones();
         for level in Level::detect().and_below() {
             let found = samples.compute(level);
@@ -157,7 +162,7 @@ fn light_samples_agree_with_the_reference_on_every_level() {
 }
 
 #[test]
-fn scattering_agrees_with_the_reference_on_every_level() {
+fn scattering_is_the_same_on_every_level() {
     let mut random = Random(3);
     let (mut shadows, mut rays) = (0, 0);
     for _ in 0..400 {
@@ -205,13 +210,14 @@ fn scattering_agrees_with_the_reference_on_every_level() {
             active: random.bits() & surface.regular,
             certain: random.bits() & random.bits(),
         };
-        let (lit, next) = (direct.reference(), scatter.reference());
-        let (reached, samples) = (direct.reach_reference(), scatter.samples_reference());
+        let lit = by(Level::SCALAR, ShadowBlock::EMPTY, |level, block| direct.compute(level, block));
+        let reached = by(Level::SCALAR, ShadowBlock::EMPTY, |level, block| direct.reach(level, block));
+        let next = by(Level::SCALAR, NextBlock::EMPTY, |level, block| scatter.compute(level, block));
+        let samples = scatter.samples(Level::SCALAR);
         shadows += lit.exists.count_ones();
         rays += next.exists.count_ones();
         for level in Level::detect().and_below() {
-            let mut found = ShadowBlock::EMPTY;
-            direct.reach(level, &mut found);
+            let found = by(level, ShadowBlock::EMPTY, |level, block| direct.reach(level, block));
             assert_eq!(found.exists, reached.exists, "{level:?}");
             for i in lanes(reached.exists) {
                 assert_eq!(found.rays[i].map(f32::to_bits), lit.rays[i].map(f32::to_bits), "{level:?}");
@@ -225,16 +231,14 @@ fn scattering_agrees_with_the_reference_on_every_level() {
                 };
                 assert_eq!(of(&found), of(&samples.0), "{level:?}");
             }
-            let mut found = ShadowBlock::EMPTY;
-            direct.compute(level, &mut found);
+            let found = by(level, ShadowBlock::EMPTY, |level, block| direct.compute(level, block));
             assert_eq!(found.exists, lit.exists, "{level:?}");
             for i in lanes(lit.exists) {
                 assert_eq!(found.rays[i].map(f32::to_bits), lit.rays[i].map(f32::to_bits), "{level:?}");
                 let contributions = [found.contribution[i], lit.contribution[i]];
                 assert_eq!(contributions[0], contributions[1], "{level:?}");
             }
-            let mut found = NextBlock::EMPTY;
-            scatter.compute(level, &mut found);
+            let found = by(level, NextBlock::EMPTY, |level, block| scatter.compute(level, block));
             assert_eq!(found.exists, next.exists, "{level:?}");
             for i in lanes(next.exists) {
                 assert_eq!(found.rays[i].map(f32::to_bits), next.rays[i].map(f32::to_bits), "{level:?}");
@@ -256,7 +260,8 @@ fn seen(random: &mut Random) -> SurfaceBlock {
         let [x, y, z] = at(&directions, i);
         [0.0, 0.0, 0.0, 1.0, x, y, z, 0.0]
     });
-    Surfaces { corners: &corners, normals: None, weights: &weights, rays: &views }.reference()
+    let surfaces = Surfaces { corners: &corners, normals: None, weights: &weights, rays: &views };
+    by(Level::SCALAR, SurfaceBlock::EMPTY, |level, block| surfaces.compute(level, block))
 }
 
 /// Coats of both kinds, rough and smooth, of which a part has no base.
@@ -307,18 +312,15 @@ fn check_samples(
 }
 
 #[test]
-fn coats_agree_with_the_reference_on_every_level() {
+fn coats_are_the_same_on_every_level() {
     let mut random = Random(5);
-    let mut tables: CoatTables = [[[0; 16]; 12]; 11];
-    for value in tables.as_flattened_mut().as_flattened_mut() {
-        *value = (random.next() * 4000.0) as i16 - 2000;
-    }
+    let tables: CoatTables = core::array::from_fn(|_| (random.next() * 4000.0) as i16 - 2000);
     let mut counts = [0; 3];
     for _ in 0..400 {
         let surface = seen(&mut random);
         let mut coats = coats(&mut random);
         let dark = coats.clone();
-        coats.see_reference(&surface, &tables);
+        coats.see(Level::SCALAR, &surface, &tables);
         let direction = random.directions();
         let (value, pdf, before) = (random.vectors(), random.row(0.0, 1.0), given(&mut random));
         let light = CoatLight { surface: &surface, coats: &coats, tables: &tables, direction: &direction };
@@ -326,12 +328,12 @@ fn coats_agree_with_the_reference_on_every_level() {
         let lobe = random.row(0.0, 1.0);
         let samples = CoatSamples { surface: &surface, coats: &coats, tables: &tables, u: &u, lobe: &lobe };
         let (mut lit, mut wanted) = ((value, pdf), before.clone());
-        light.reference(&mut lit.0, &mut lit.1);
-        let sets = samples.reference(&mut wanted);
+        light.compute(Level::SCALAR, &mut lit.0, &mut lit.1);
+        let sets = samples.compute(Level::SCALAR, &mut wanted);
         let set = coats.exists & surface.regular;
         counts[0] += lanes(set).filter(|&i| lit.1[i] > 0.0).count();
-        counts[1] += (sets[0] & set).count_ones() as usize;
-        counts[2] += (sets[1] & set).count_ones() as usize;
+        counts[1] += (sets.exists & set).count_ones() as usize;
+        counts[2] += (sets.delta & set).count_ones() as usize;
         for level in Level::detect().and_below() {
             let mut found = dark.clone();
             found.see(level, &surface, &tables);
@@ -348,24 +350,23 @@ fn coats_agree_with_the_reference_on_every_level() {
             }
             let mut found = before.clone();
             let found_sets = samples.compute(level, &mut found);
-            assert_eq!(found_sets.map(|bits| bits & set), sets.map(|bits| bits & set), "{level:?}");
-            check_samples(&found, &wanted, &before, [sets[0] & set, coats.exists]);
+            let all = |sets: &CoatSets| [sets.exists, sets.delta].map(|bits| bits & set);
+            assert_eq!(all(&found_sets), all(&sets), "{level:?}");
+            assert_eq!((found_sets.exists | found_sets.delta) & !coats.exists, 0, "{level:?}");
+            check_samples(&found, &wanted, &before, [sets.exists & set, coats.exists]);
         }
     }
     assert!(counts.iter().all(|&count| count > 200), "{counts:?}");
 }
 
 #[test]
-fn coats_apart_agree_with_the_reference_on_every_level() {
+fn coats_apart_are_the_same_on_every_level() {
     let mut random = Random(15);
-    let mut tables: CoatTables = [[[0; 16]; 12]; 11];
-    for value in tables.as_flattened_mut().as_flattened_mut() {
-        *value = (random.next() * 4000.0) as i16 - 2000;
-    }
+    let tables: CoatTables = core::array::from_fn(|_| (random.next() * 4000.0) as i16 - 2000);
     let mut counts = [0; 4];
     for _ in 0..400 {
         let (surface, mut coats) = (seen(&mut random), coats(&mut random));
-        coats.see_reference(&surface, &tables);
+        coats.see(Level::SCALAR, &surface, &tables);
         let light = LightBlock {
             direction: random.directions(),
             pdf: random.row(0.01, 2.0),
@@ -381,24 +382,24 @@ fn coats_apart_agree_with_the_reference_on_every_level() {
         let light = ApartLight { surface, coats, tables, light: &light, each, throughput, supplied };
         let samples = CoatSamples { surface, coats, tables, u: &u, lobe: &lobe };
         let (mut lit, mut wanted) = (ApartBlock::EMPTY, before.clone());
-        light.reference(&mut lit);
-        let sets = samples.reference_apart(&mut wanted);
+        light.compute(Level::SCALAR, &mut lit);
+        let sets = samples.compute_apart(Level::SCALAR, &mut wanted);
         let set = coats.apart & surface.regular;
         counts[0] += lanes(set).filter(|&i| lit.contribution[0][i] != 0.0).count();
         for (count, set) in counts[1..].iter_mut().zip([sets.exists, sets.delta, sets.coat & !sets.delta]) {
             *count += (set & surface.regular).count_ones() as usize;
         }
         for level in Level::detect().and_below() {
-            let mut found = ApartBlock::EMPTY;
-            light.compute(level, &mut found);
+            let found = by(level, ApartBlock::EMPTY, |level, block| light.compute(level, block));
             for i in lanes(set) {
                 let all = |of: &ApartBlock| [&of.value, &of.contribution, &of.base].map(|row| bits3(row, i));
                 assert_eq!(all(&found), all(&lit), "{level:?} {i}");
             }
             let mut found = before.clone();
             let found_sets = samples.compute_apart(level, &mut found);
-            let all = |sets: &ApartSets| [sets.exists, sets.delta, sets.coat].map(|bits| bits & set);
+            let all = |sets: &CoatSets| [sets.exists, sets.delta, sets.coat].map(|bits| bits & set);
             assert_eq!(all(&found_sets), all(&sets), "{level:?}");
+            assert_eq!((found_sets.exists | found_sets.delta | found_sets.coat) & !coats.apart, 0);
             check_samples(&found, &wanted, &before, [sets.exists & set, coats.apart]);
         }
     }
@@ -406,7 +407,7 @@ fn coats_apart_agree_with_the_reference_on_every_level() {
 }
 
 #[test]
-fn smooth_surfaces_agree_with_the_reference_on_every_level() {
+fn smooth_surfaces_are_the_same_on_every_level() {
     let mut random = Random(6);
     let mut counts = [0; 3];
     for _ in 0..400 {
@@ -420,7 +421,7 @@ fn smooth_surfaces_agree_with_the_reference_on_every_level() {
         let lobe = random.row(0.0, 1.0);
         let samples = SpecularSamples { surface: &surface, specular: &specular, lobe: &lobe };
         let mut wanted = before.clone();
-        let set = samples.reference(&mut wanted) & surface.regular;
+        let set = samples.compute(Level::SCALAR, &mut wanted) & surface.regular;
         counts[0] += (set & !dielectric).count_ones();
         let refracted = lanes(set & dielectric).filter(|&i| wanted.direction[2][i] < 0.0).count() as u32;
         counts[1] += refracted;
@@ -435,7 +436,7 @@ fn smooth_surfaces_agree_with_the_reference_on_every_level() {
 }
 
 #[test]
-fn environment_samples_agree_with_the_reference_on_every_level() {
+fn environment_samples_are_the_same_on_every_level() {
     let mut random = Random(7);
     let mut counts = [0; 2];
     for round in 0..400 {
@@ -453,7 +454,7 @@ fn environment_samples_agree_with_the_reference_on_every_level() {
         let samples = SkySamples { sky: &sky, to_world, active: random.bits() };
         let before = (random.vectors(), random.row(0.0, 1.0));
         let mut wanted = before;
-        let set = samples.reference(&mut wanted.0, &mut wanted.1);
+        let set = samples.compute(Level::SCALAR, &mut wanted.0, &mut wanted.1);
         counts[round % 2] += set.count_ones();
         for level in Level::detect().and_below() {
             let mut found = before;
@@ -468,7 +469,7 @@ fn environment_samples_agree_with_the_reference_on_every_level() {
 }
 
 #[test]
-fn texture_look_ups_agree_with_the_reference_on_every_level() {
+fn texture_look_ups_are_the_same_on_every_level() {
     let mut random = Random(8);
     for round in 0..400 {
         let far = [2.0, 100.0, 1e7][round % 3];
@@ -483,9 +484,9 @@ fn texture_look_ups_agree_with_the_reference_on_every_level() {
         wanted.at[0][..8].copy_from_slice(&wild);
         (wanted.size[0][5], wanted.size[1][6]) = (MAX_SIZE as f32, 1.0);
         let given = wanted.clone();
-        wanted.surround_reference();
+        wanted.surround(Level::SCALAR);
         let mut mixture = [[0.0; 16]; 3];
-        wanted.mix_reference(&mut mixture);
+        wanted.mix(Level::SCALAR, &mut mixture);
         for i in 0..16 {
             for axis in 0..2 {
                 let (size, weight) = (wanted.size[axis][i], wanted.weight[axis][i]);
@@ -511,7 +512,7 @@ fn texture_look_ups_agree_with_the_reference_on_every_level() {
 }
 
 #[test]
-fn camera_rays_agree_with_the_reference_on_every_level() {
+fn camera_rays_are_the_same_on_every_level() {
     let mut random = Random(4);
     for _ in 0..100 {
         let raster = [random.row(0.0, 640.0), random.row(0.0, 480.0)];
@@ -519,17 +520,16 @@ fn camera_rays_agree_with_the_reference_on_every_level() {
             .map(|d| [d[0][0], d[1][0], d[2][0]]);
         let rays =
             CameraRays { eye: [1.0, -2.0, 3.0], axes, pixel: 0.002, half: [320.0, 240.0], raster: &raster };
-        let wanted = rays.reference();
+        let wanted = by(Level::SCALAR, [[0.0; 8]; 16], |level, out| rays.compute(level, out));
         for level in Level::detect().and_below() {
-            let mut found = [[0.0; 8]; 16];
-            rays.compute(level, &mut found);
+            let found = by(level, [[0.0; 8]; 16], |level, out| rays.compute(level, out));
             assert_eq!(found, wanted, "{level:?}");
         }
     }
 }
 
 #[test]
-fn rough_dielectrics_agree_with_the_reference_on_every_level() {
+fn rough_dielectrics_are_the_same_on_every_level() {
     let mut random = Random(11);
     let (mut lit, mut sampled) = ([0; 2], 0);
     for _ in 0..400 {
@@ -544,8 +544,8 @@ fn rough_dielectrics_agree_with_the_reference_on_every_level() {
         let (value, pdf, before) = (random.vectors(), random.row(0.0, 1.0), given(&mut random));
         let (u, lobe) = ([random.row(0.0, 1.0), random.row(0.0, 1.0)], random.row(0.0, 1.0));
         let (mut wanted, mut samples) = ((value, pdf), before.clone());
-        rough.light_reference(&direction, &mut wanted.0, &mut wanted.1);
-        let set = rough.sample_reference((&u, &lobe), &mut samples);
+        rough.light(Level::SCALAR, &direction, &mut wanted.0, &mut wanted.1);
+        let set = rough.sample(Level::SCALAR, (&u, &lobe), &mut samples);
         for i in lanes(rough.rough.exists).filter(|&i| wanted.1[i] > 0.0) {
             lit[usize::from(dot(at(&direction, i), at(&surface.frame[2], i)) < 0.0)] += 1;
         }

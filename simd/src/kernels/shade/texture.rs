@@ -1,9 +1,8 @@
 //! Bilinear look-ups of textures at the vertices of a block, over lanes: the texels around the texture
 //! coordinates, and their mixture. The caller loads the texels in between.
 
-use super::load::{All, Load, One};
 use super::vector::{self, add, scale};
-use super::{Row, Row3, put};
+use super::{Row, Row3, load2, load3};
 use crate::lanes::{Lanes, Simd};
 use crate::level::{Kernel, Level};
 
@@ -44,44 +43,14 @@ impl TextureBlock {
         texels: [[[0.0; 16]; 3]; 4],
     };
 
-    /// Texels and weights along one axis over lanes.
-    #[inline(always)]
-    fn around<F: Load>(&self, from: F, axis: usize) -> [F::Lanes; 3] {
-        surround(from.row(&self.at[axis]), from.row(&self.size[axis]), from.set(self.clamps))
-    }
-
     /// Computes the places and weights of the texels by the instructions of `level`.
     pub fn surround(&mut self, level: Level) {
-        level.dispatch(SurroundKernel(self));
-    }
-
-    /// Scalar reference; equals [`TextureBlock::surround`] to the bit.
-    pub fn surround_reference(&mut self) {
-        for axis in 0..2 {
-            for i in 0..super::BLOCK {
-                [self.first[axis][i], self.second[axis][i], self.weight[axis][i]] = self.around(One(i), axis);
-            }
-        }
-    }
-
-    /// Mixtures of the texels over lanes.
-    #[inline(always)]
-    fn mixture<F: Load>(&self, from: F) -> [F::Lanes; 3] {
-        let [a, b, c, d] = &self.texels;
-        let texels = [from.row3(a), from.row3(b), from.row3(c), from.row3(d)];
-        mix(texels, [from.row(&self.weight[0]), from.row(&self.weight[1])])
+        level.dispatch(self);
     }
 
     /// Mixtures of the texels by the instructions of `level`.
     pub fn mix(&self, level: Level, mixture: &mut Row3) {
-        level.dispatch(MixKernel(self, mixture));
-    }
-
-    /// Scalar reference; equals [`TextureBlock::mix`] to the bit.
-    pub fn mix_reference(&self, mixture: &mut Row3) {
-        for i in 0..super::BLOCK {
-            put(mixture, i, self.mixture(One(i)));
-        }
+        level.dispatch((self, mixture));
     }
 }
 
@@ -120,30 +89,29 @@ fn lerp<L: Lanes>(a: [L; 3], b: [L; 3], t: L) -> [L; 3] {
     add(scale(a, t.all(1.0) - t), scale(b, t))
 }
 
-struct SurroundKernel<'k>(&'k mut TextureBlock);
-
-impl Kernel for SurroundKernel<'_> {
+impl Kernel for &mut TextureBlock {
     type Out = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let block = self.0;
+        let clamps = simd.mask16(self.clamps);
         for axis in 0..2 {
-            let [first, second, weight] = block.around(All(simd), axis);
-            block.first[axis] = first.to_array();
-            block.second[axis] = second.to_array();
-            block.weight[axis] = weight.to_array();
+            let (at, size) = (simd.load16(&self.at[axis]), simd.load16(&self.size[axis]));
+            let [first, second, weight] = surround(at, size, clamps);
+            self.first[axis] = first.to_array();
+            self.second[axis] = second.to_array();
+            self.weight[axis] = weight.to_array();
         }
     }
 }
 
-struct MixKernel<'k>(&'k TextureBlock, &'k mut Row3);
-
-impl Kernel for MixKernel<'_> {
+impl Kernel for (&TextureBlock, &mut Row3) {
     type Out = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        *self.1 = vector::to_arrays(self.0.mixture(All(simd)));
+        let [a, b, c, d] = &self.0.texels;
+        let texels = [load3(simd, a), load3(simd, b), load3(simd, c), load3(simd, d)];
+        *self.1 = vector::to_arrays(mix(texels, load2(simd, &self.0.weight)));
     }
 }

@@ -89,7 +89,7 @@ fn ggx(table: &mut Table) {
         let (d, a2) = (m.as_dvec3(), f64::from(alpha) * f64::from(alpha));
         let (xy2, z2) = (d.x * d.x + d.y * d.y, d.z * d.z);
         let q = (xy2 + z2) / (xy2 + a2 * z2);
-        ulps(Ggx::new(alpha).density(m), a2 / core::f64::consts::PI * q * q)
+        ulps(Ggx::new(alpha).density(m.into()), a2 / core::f64::consts::PI * q * q)
     });
     // Ten roundings, those before the square count twice.
     table.units("GGX density, alpha 1e-4 to 1, of itself", 16.0, worst(density));
@@ -97,7 +97,7 @@ fn ggx(table: &mut Table) {
         let v = direction(angle);
         let (d, a2) = (v.as_dvec3(), f64::from(alpha) * f64::from(alpha));
         let stretch = (a2 * (d.x * d.x + d.y * d.y) + d.z * d.z).sqrt();
-        ulps(Ggx::new(alpha).masking(v), 2.0 * d.z.abs() / (d.z.abs() + stretch))
+        ulps(Ggx::new(alpha).masking(v.into()), 2.0 * d.z.abs() / (d.z.abs() + stretch))
     });
     table.units("Smith masking, alpha 1e-4 to 1, of itself", 6.0, worst(masking));
 }

@@ -19,7 +19,7 @@ const LONG_FUNCTIONS: &[(&str, usize)] = &[
     ("core/src/bvh/stream.rs: trace", 98),
     ("fuzz/src/bidirectional.rs: attempt", 90),
     ("fuzz/src/shading.rs: attempt", 169),
-    ("simd/src/kernels/shade/tests.rs: scattering_agrees_with_the_reference_on_every_level", 89),
+    ("simd/src/kernels/shade/tests.rs: scattering_is_the_same_on_every_level", 88),
     ("tests/lab/src/bench/shade/data.rs: new", 104),
     ("tests/tests/caustics.rs: guided_photons_reach_a_small_mirror_with_the_right_power", 82),
 ];

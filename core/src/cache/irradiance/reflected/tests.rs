@@ -172,7 +172,7 @@ fn uniform_light_is_reflected_by_the_albedo() {
                     }
                     let albedo = brute(&bsdf, viewer(degrees), |_| 1.0);
                     let base = match bsdf.has_coated_base() {
-                        true => bsdf.base_radiance::<All>(
+                        true => bsdf.base_radiance(
                             viewer(degrees),
                             Rgb::splat(core::f32::consts::PI),
                             Rgb::splat(core::f32::consts::PI / 21.0),
@@ -200,7 +200,7 @@ fn light_of_the_span_is_reflected_as_by_brute_force() {
                     let found = reflected(cache, &bsdf, Vec3::Z, viewer(degrees)).unwrap();
                     let hemisphere = sky.hemisphere();
                     let base = match bsdf.has_coated_base() {
-                        true => bsdf.base_radiance::<All>(
+                        true => bsdf.base_radiance(
                             viewer(degrees),
                             hemisphere.irradiance(),
                             hemisphere.edge_moment(),

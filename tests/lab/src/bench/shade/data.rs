@@ -10,7 +10,7 @@ use halflight_simd::kernels::shade::coat::CoatBlock;
 use halflight_simd::kernels::shade::coat_tables::CoatTables;
 use halflight_simd::kernels::shade::direct::{Direct, LightBlock, ShadowBlock};
 use halflight_simd::kernels::shade::emitter::{EmitterBlock, EmitterSampleBlock, EmitterSamples};
-use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers, pair, place_key, single};
+use halflight_simd::kernels::shade::numbers::{Offsets, SampleBlock, VertexNumbers};
 use halflight_simd::kernels::shade::scatter::{NextBlock, Scatter, ScatterBlock};
 use halflight_simd::kernels::shade::sky::{SkyBlock, SkySamples};
 use halflight_simd::kernels::shade::specular::SpecularBlock;
@@ -21,8 +21,8 @@ use halflight_simd::kernels::shade::{Row, Row3, at};
 /// Kernel by name.
 pub(super) struct Kernel {
     pub(super) name: &'static str,
-    /// Shades one block by lanes of a level, or by the scalar reference.
-    pub(super) run: fn(&Blocks, usize, Option<Level>),
+    /// Shades one block by the lanes of a level.
+    pub(super) run: fn(&Blocks, usize, Level),
 }
 
 /// Kernels in the order of a path.
@@ -57,7 +57,7 @@ const DIFFUSE: usize = 0;
 const METAL: usize = 1;
 
 /// Tables of rough coats; their values do not affect the time.
-pub(super) static TABLES: CoatTables = [[[-100; 16]; 12]; 11];
+pub(super) static TABLES: CoatTables = [-100; 2112];
 
 /// Offset of the choice of the lobe.
 pub(super) const LOBE: u32 = 3;
@@ -109,15 +109,15 @@ impl Block {
             let length = (x * x + y * y + z * z).sqrt();
             [0.0, 1.0, 0.0, f32::INFINITY, x / length, y / length, z / length, 0.0]
         });
-        let surface =
-            Surfaces { corners: &corners, normals: None, weights: &weights, rays: &rays }.reference();
+        let (mut surface, mut numbers) = (SurfaceBlock::EMPTY, VertexNumbers::EMPTY);
+        Surfaces { corners: &corners, normals: None, weights: &weights, rays: &rays }
+            .compute(Level::BASELINE, &mut surface);
         let mut samples = SampleBlock::EMPTY;
         for i in 0..16 {
-            samples.place[i] = seed << 8 | i as u64;
-            samples.index[i] = seed as u32;
-            samples.dimension[i] = 7;
+            (samples.place[i], samples.index[i], samples.dimension[i]) =
+                (seed << 8 | i as u64, seed as u32, 7);
         }
-        let numbers = samples.reference(OFFSETS, true);
+        samples.vertices(Level::BASELINE, OFFSETS, true, &mut numbers);
         // A square lamp of side 1 at the height 2, which shines downwards.
         let mut lights = EmitterBlock::EMPTY;
         lights.origin = [[-0.5; 16], [2.0; 16], [-0.5; 16]];
@@ -133,7 +133,7 @@ impl Block {
             probability: &probability,
             active: 0xffff,
         }
-        .reference();
+        .compute(Level::BASELINE);
         let light = LightBlock {
             direction,
             end,
@@ -160,7 +160,7 @@ impl Block {
             dielectric: 0xffff,
             ..CoatBlock::EMPTY
         };
-        coats.see_reference(&surface, &TABLES);
+        coats.see(Level::BASELINE, &surface, &TABLES);
         let glass = SpecularBlock {
             color: [[1.0; 16]; 3],
             eta: [1.5; 16],
@@ -198,86 +198,57 @@ impl Block {
         }
     }
 
-    fn camera(&self, level: Option<Level>) {
+    fn camera(&self, level: Level) {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
         let raster = &self.raster;
         let rays = CameraRays { eye: [0.0; 3], axes, pixel: 0.002, half: [320.0, 240.0], raster };
         let mut out = [[0.0; 8]; 16];
-        match level {
-            None => out = rays.reference(),
-            Some(level) => rays.compute(level, &mut out),
-        }
+        rays.compute(level, &mut out);
         black_box(&out);
     }
 
-    fn surface(&self, level: Option<Level>) {
+    fn surface(&self, level: Level) {
         let Self { corners, weights, rays, .. } = self;
         let surfaces = Surfaces { corners, normals: None, weights, rays };
         let mut block = SurfaceBlock::EMPTY;
-        match level {
-            None => block = surfaces.reference(),
-            Some(level) => surfaces.compute(level, &mut block),
-        }
+        surfaces.compute(level, &mut block);
         black_box(&block);
     }
 
-    fn numbers(&self, level: Option<Level>) {
+    fn numbers(&self, level: Level) {
         let samples = &self.samples;
         let mut numbers = VertexNumbers::EMPTY;
-        match level {
-            None => numbers = samples.reference(OFFSETS, true),
-            Some(level) => samples.vertices(level, OFFSETS, true, &mut numbers),
-        }
+        samples.vertices(level, OFFSETS, true, &mut numbers);
         black_box(&numbers);
     }
 
-    fn light_numbers(&self, level: Option<Level>) {
+    fn light_numbers(&self, level: Level) {
         let samples = &self.samples;
         let mut numbers = VertexNumbers::EMPTY;
-        match level {
-            None => {
-                for i in 0..16 {
-                    let (key, first) = (place_key(samples.place[i]), samples.dimension[i]);
-                    let index = samples.index[i].reverse_bits();
-                    let [x, y] = pair(key, index, first + OFFSETS.light);
-                    (numbers.light[0][i], numbers.light[1][i]) = (x, y);
-                    numbers.choice[i] = single(key, index, first + OFFSETS.choice);
-                }
-            }
-            Some(level) => samples.lights(level, OFFSETS, &mut numbers),
-        }
+        samples.lights(level, OFFSETS, &mut numbers);
         black_box(&numbers);
     }
 
-    fn surround(&self, level: Option<Level>) {
+    fn surround(&self, level: Level) {
         let mut block = self.textures.clone();
-        match level {
-            None => block.surround_reference(),
-            Some(level) => block.surround(level),
-        }
+        block.surround(level);
         black_box(&block);
     }
 
-    fn mix(&self, level: Option<Level>) {
+    fn mix(&self, level: Level) {
         let mut mixture = self.ones;
-        match level {
-            None => self.textures.mix_reference(&mut mixture),
-            Some(level) => self.textures.mix(level, &mut mixture),
-        }
+        self.textures.mix(level, &mut mixture);
         black_box(&mixture);
     }
 
-    fn groups(&self, level: Option<Level>) {
+    fn groups(&self, level: Level) {
         let choices = Choices { weights: &self.groups, u: &self.numbers.choice };
         let mut block = ChoiceBlock::EMPTY;
-        match level {
-            None => block = choices.reference(),
-            Some(level) => choices.compute(level, &mut block),
-        }
+        choices.compute(level, &mut block);
         black_box(&block);
     }
 
-    fn light(&self, level: Option<Level>) {
+    fn light(&self, level: Level) {
         let samples = EmitterSamples {
             lights: &self.lights,
             from: &self.surface.position,
@@ -286,18 +257,15 @@ impl Block {
             probability: &self.ones[0],
             active: 0xffff,
         };
-        black_box(level.map_or_else(|| samples.reference(), |level| samples.compute(level)));
+        black_box(samples.compute(level));
     }
 
-    fn sky(&self, level: Option<Level>) {
+    fn sky(&self, level: Level) {
         let sky = SkyBlock { at: self.numbers.light, ..SkyBlock::EMPTY };
         let to_world = Some([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let samples = SkySamples { sky: &sky, to_world, active: 0xffff };
         let (mut direction, mut pdf) = (self.ones, self.ones[0]);
-        black_box(match level {
-            None => samples.reference(&mut direction, &mut pdf),
-            Some(level) => samples.compute(level, &mut direction, &mut pdf),
-        });
+        black_box(samples.compute(level, &mut direction, &mut pdf));
         black_box((&direction, &pdf));
     }
 
@@ -313,23 +281,17 @@ impl Block {
         }
     }
 
-    fn reach(&self, bsdf: usize, level: Option<Level>) {
+    fn reach(&self, bsdf: usize, level: Level) {
         let direct = self.lit(bsdf);
         let mut block = ShadowBlock::EMPTY;
-        match level {
-            None => block = direct.reach_reference(),
-            Some(level) => direct.reach(level, &mut block),
-        }
+        direct.reach(level, &mut block);
         black_box(&block);
     }
 
-    fn direct(&self, bsdf: usize, level: Option<Level>) {
+    fn direct(&self, bsdf: usize, level: Level) {
         let direct = self.lit(bsdf);
         let mut block = ShadowBlock::EMPTY;
-        match level {
-            None => block = direct.reference(),
-            Some(level) => direct.compute(level, &mut block),
-        }
+        direct.compute(level, &mut block);
         black_box(&block);
     }
 
@@ -349,18 +311,15 @@ impl Block {
         }
     }
 
-    fn sample_metal(&self, level: Option<Level>) {
+    fn sample_metal(&self, level: Level) {
         let scatter = self.scattered(METAL);
-        black_box(level.map_or_else(|| scatter.samples_reference(), |level| scatter.samples(level)));
+        black_box(scatter.samples(level));
     }
 
-    fn scatter(&self, bsdf: usize, level: Option<Level>) {
+    fn scatter(&self, bsdf: usize, level: Level) {
         let scatter = self.scattered(bsdf);
         let mut block = NextBlock::EMPTY;
-        match level {
-            None => block = scatter.reference(),
-            Some(level) => scatter.compute(level, &mut block),
-        }
+        scatter.compute(level, &mut block);
         black_box(&block);
     }
 }

@@ -1,4 +1,4 @@
-//! Nanoseconds per vertex of the shading kernels, by lanes and by their scalar references.
+//! Nanoseconds per vertex of the shading kernels.
 //!
 //! [`BLOCKS`] random blocks of sixteen vertices, which fit into the second-level cache, are shaded repeatedly
 //! for [`SECONDS`].
@@ -23,17 +23,9 @@ const SECONDS: f64 = 0.01;
 
 /// Nanoseconds per vertex of the shading kernels
 ///
-/// Camera rays, surface points, random numbers, light samples and scattering, by lanes and by their scalar
-/// references, in blocks of sixteen vertices.
+/// Camera rays, surface points, random numbers, light samples and scattering in blocks of sixteen vertices.
 #[derive(Args)]
 pub(super) struct Shade;
-
-/// Nanoseconds per vertex of one kernel.
-struct KernelTimes {
-    name: &'static str,
-    scalar: f64,
-    lanes: f64,
-}
 
 impl Shade {
     pub(super) fn run(&self, level: Level, output: &mut Output) -> Result<()> {
@@ -42,17 +34,13 @@ impl Shade {
             "{BLOCKS} blocks of 16 vertices, one thread, {}; medians of {REPETITIONS}, ns a vertex",
             level.name()
         ));
-        output.line(row("", ["scalar", "lanes", "ratio"].map(String::from)));
-        for KernelTimes { name, scalar, lanes } in &kernels {
-            let cells = [format!("{scalar:.2}"), format!("{lanes:.2}"), format!("{:.1}", scalar / lanes)];
-            output.line(row(name, cells));
+        for (name, time) in &kernels {
+            output.line(row(name, [format!("{time:.2}")]));
         }
-        let by_name = |time: fn(&KernelTimes) -> f64| -> Value {
-            kernels.iter().map(|kernel| (kernel.name.to_owned(), json!(time(kernel)))).collect()
-        };
+        let by_name: Value = kernels.iter().map(|(name, time)| ((*name).to_owned(), json!(time))).collect();
         output.object(&json!({
             "level": level.name(),
-            "ns_per_vertex": { "scalar": by_name(|k| k.scalar), "lanes": by_name(|k| k.lanes) },
+            "ns_per_vertex": by_name,
             "blocks": BLOCKS,
             "repetitions": REPETITIONS,
         }));
@@ -60,18 +48,12 @@ impl Shade {
     }
 }
 
-/// Times of the kernels of `level`, in the order of a path.
-fn measure(level: Level) -> Vec<KernelTimes> {
+/// Times of the kernels of `level` by name, in the order of a path.
+fn measure(level: Level) -> Vec<(&'static str, f64)> {
     let blocks = Blocks::new(BLOCKS);
     let kernels = data::KERNELS.iter().map(|kernel| {
-        let mut times = [Vec::new(), Vec::new()];
-        for _ in 0..REPETITIONS {
-            for (times, level) in times.iter_mut().zip([None, Some(level)]) {
-                times.push(per_vertex(|block| (kernel.run)(&blocks, block, level)));
-            }
-        }
-        let [scalar, lanes] = times.map(median);
-        KernelTimes { name: kernel.name, scalar, lanes }
+        let time = |_| per_vertex(|block| (kernel.run)(&blocks, block, level));
+        (kernel.name, median((0..REPETITIONS).map(time).collect()))
     });
     kernels.collect()
 }
@@ -100,6 +82,6 @@ mod tests {
     fn every_kernel_takes_time() {
         let kernels = measure(Level::BASELINE);
         assert_eq!(kernels.len(), data::KERNELS.len());
-        assert!(kernels.iter().all(|kernel| kernel.scalar > 0.0 && kernel.lanes > 0.0));
+        assert!(kernels.iter().all(|(_, time)| *time > 0.0));
     }
 }
