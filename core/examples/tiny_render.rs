@@ -1,6 +1,5 @@
-//! A small picture by every method in one buffer, such as a `static` of a microcontroller: no heap, no
-//! threads, and an operating system only to print. `cargo verify targets` runs this very file without
-//! libc, as WebAssembly and for Cortex-M: same bits everywhere.
+//! A small picture by every method in one buffer: no heap, no threads, an operating system only to print.
+//! `cargo verify targets` runs this very file without libc, as WebAssembly and for Cortex-M: same bits.
 #[path = "room/mod.rs"]
 pub mod room;
 
@@ -19,6 +18,7 @@ const COUNTS: BidirectionalSettings =
     BidirectionalSettings { light_paths: Some(1024), connections: Some(1), merging: Some(false) };
 const CACHE: CacheOptions = CacheOptions { strata: Some(8), records: Some(512), ..CacheOptions::DEFAULT };
 const LOBES: LobeSettings = LobeSettings { tolerance: 0.05, degree: 2, ..LobeSettings::DEFAULT };
+/// All methods.
 pub const METHODS: [Method; 10] = [
     Method::Path(PathOptions::PLAIN),
     Method::LightTracing(COUNTS),
