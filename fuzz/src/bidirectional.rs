@@ -10,7 +10,7 @@ use halflight_core::photon::Photons;
 use halflight_core::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use halflight_core::transport::bidirectional::light_pass::{LightPass, TaskOutput, VERTICES_PER_TASK};
 use halflight_core::transport::bidirectional::merge_photons::{MergeRadii, Merging};
-use halflight_core::transport::bidirectional::mis::Counts;
+use halflight_core::transport::bidirectional::Counts;
 use halflight_core::transport::bidirectional::reference::{LightPath, Reference};
 use halflight_core::transport::bidirectional::vertex::LightVertex;
 use halflight_core::transport::{RadiusSchedule, SceneContext};
