@@ -243,6 +243,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
     }
 
     /// One vertex of a path. The ray by which the path goes on.
+    #[inline]
     fn step(
         &self,
         path: &mut CameraPath,
@@ -294,10 +295,14 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             }
         }
         let sample = || bsdf.sample::<F>(vertex.wo, dimension::bsdf_sample(&sampler, segments));
-        self.scatter(path, &at, &shaded.scattered(sample)?, counters)
+        let sample = shaded.scattered(sample)?;
+        let first = dimension::vertex(segments);
+        let roulette = || shaded.roulette(|| sampler.single(first + dimension::ROULETTE));
+        self.scatter(path, &at, &sample, roulette, counters)
     }
 
     /// The vertex where the path arrives.
+    #[inline]
     fn arrive<'v>(
         &self,
         path: &CameraPath,
@@ -326,21 +331,22 @@ impl<'a, F: Features> CameraPaths<'a, F> {
     }
 
     /// The path goes on by a `sample` of the BSDF. Its next ray.
+    #[inline]
     fn scatter(
         &self,
         path: &mut CameraPath,
-        CameraVertex { vertex, eta_vcm, sampler, .. }: &CameraVertex,
+        CameraVertex { vertex, eta_vcm, .. }: &CameraVertex,
         sample: &BsdfSample,
+        roulette: impl FnOnce() -> f32,
         counters: &mut Counters,
     ) -> Option<Ray> {
-        let (mut vertex, segments) = (*vertex, path.subpath.segments);
+        let mut vertex = *vertex;
         if sample.delta {
             // The next vertex is behind a caster.
             vertex.sums = vertex.sums.with_merge();
         }
         let is_rough = !vertex.at.bsdf.is_caustic_caster();
         let sample_and_merges = (sample, is_rough.then_some(*eta_vcm));
-        let roulette = || sampler.single(dimension::vertex(segments) + dimension::ROULETTE);
         let at = (&mut path.subpath, &mut path.eta_squared);
         let (next, _) = self.walk.go_on(at, &vertex, sample_and_merges, roulette, counters)?;
         path.eta_vcm = if sample.delta { 0.0 } else { *eta_vcm };

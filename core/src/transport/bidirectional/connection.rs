@@ -18,6 +18,7 @@ use glam::Vec3;
 impl<F: Features> CameraPaths<'_, F> {
     /// Draws the light vertices that the vertex at the end of a path's segment is connected to, one of each
     /// of as many parts of their list.
+    #[inline]
     pub(super) fn draw(&self, path: &CameraPath, sampler: &Sampler, drawn: &mut [u32]) {
         let Connections { vertices, count } = self.connections;
         let random = sampler.single(dimension::CONNECTION + path.subpath.segments);
@@ -28,6 +29,7 @@ impl<F: Features> CameraPaths<'_, F> {
     }
 
     /// Connections to the light vertices `drawn`.
+    #[inline]
     pub(super) fn connect(
         &self,
         path: &CameraPath,
@@ -47,6 +49,7 @@ impl<F: Features> CameraPaths<'_, F> {
 
     /// The connection of a camera vertex with a light vertex: its shadow ray, and what arrives if nothing is
     /// in its way.
+    #[inline]
     fn connection(
         &self,
         path: &CameraPath,

@@ -131,12 +131,14 @@ struct Writer<'w, F> {
 
 impl<F: Features> Writer<'_, F> {
     /// The vertex of the light path at `vertex`, with the sums of `state`.
+    #[inline]
     fn vertex<'v>(state: &LightPathState, &Vertex { point, bsdf, to_light, .. }: &Vertex<'v>) -> Arrived<'v> {
         let at = Scatterer { point, bsdf };
         Arrived { sums: state.sums, ..Arrived::new(at, -to_light) }
     }
 
     /// η at a rough vertex and the way by which light comes there, if it may be merged. `None` at a caster.
+    #[inline]
     fn merge(&self, state: &LightPathState, vertex: &Vertex) -> Option<(f32, Option<Arrival>)> {
         if vertex.bsdf.is_caustic_caster() {
             return None;
@@ -152,6 +154,7 @@ impl<F: Features> Writer<'_, F> {
         Some((if arrival.is_some() { eta_vcm } else { 0.0 }, arrival))
     }
 
+    #[inline]
     fn store(&mut self, state: &LightPathState, vertex: &Vertex, counters: &mut Counters) {
         if self.pass.counts.connections == 0.0 && self.pass.merging.is_none() {
             return;
@@ -179,6 +182,7 @@ impl<F: Features> Writer<'_, F> {
     }
 
     /// Sends a shadow ray from the vertex to the lens, if the picture has a pixel there.
+    #[inline]
     fn splat(&mut self, state: &LightPathState, vertex: &Vertex, arrived: Arrived, counters: &mut Counters) {
         // Light samples find direct light with less noise.
         if state.segments == 1 || state.segments + 1 > self.pass.settings.max_depth {

@@ -23,6 +23,7 @@ use glam::Vec3;
 
 impl<F: Features> CameraPaths<'_, F> {
     /// Light of the photons around `vertex`.
+    #[inline]
     pub(super) fn merge(&self, path: &mut CameraPath, vertex: &CameraVertex) {
         let Some(Merging { photons, radii, .. }) = &self.merging else { return };
         let CameraVertex { vertex: Vertex { at: Scatterer { point, .. }, .. }, eta_vcm, ref sampler, .. } =

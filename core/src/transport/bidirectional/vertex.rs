@@ -41,11 +41,13 @@ impl LightVertex {
     }
 
     /// Records that do not supply the light which comes to the vertex.
+    #[inline]
     pub(super) fn rest(&self) -> Rest {
         Rest::from_bits(u32::from(self.arrival >> 8))
     }
 
     /// The way by which light comes to it; `None` where it is not merged.
+    #[inline]
     pub(super) fn arrival(&self) -> Option<Arrival> {
         match self.arrival & 0xff {
             0 => None,
@@ -55,6 +57,7 @@ impl LightVertex {
     }
 
     /// The surface point, as the light path saw it.
+    #[inline]
     pub(super) fn point<'a, F: Features>(&self, context: &SceneContext<'a, F>) -> Option<SurfacePoint<'a>> {
         let [u, v] = self.barycentric;
         let direction = -Vec3::from(self.to_light);

@@ -228,7 +228,7 @@ impl<'a, F: Features> Paths<'a, F> {
             }
         }
         let sample = shaded.scattered(|| bsdf.sample::<F>(vertex.wo, numbers.scattering(segments)))?;
-        let (subpath, roulette) = (&mut path.subpath, || numbers.roulette(segments));
+        let (subpath, roulette) = (&mut path.subpath, || shaded.roulette(|| numbers.roulette(segments)));
         let at = (subpath, &mut path.eta_squared);
         let (next, survival) = walk.go_on(at, &vertex, (&sample, None), roulette, counters)?;
         path.survival *= survival;

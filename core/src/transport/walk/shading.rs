@@ -34,8 +34,9 @@ pub(crate) enum VertexNumbers {
 pub(crate) struct Shading<'a> {
     block: Block<'a>,
     sets: Sets,
-    /// Set of vertices in lanes.
+    /// Set of vertices in lanes, and of those whose numbers are of a sequence.
     has: u32,
+    drawn: u32,
 }
 
 /// Hit of a block, with its samples if it was shaded in lanes.
@@ -43,6 +44,8 @@ pub(crate) struct Shading<'a> {
 pub(crate) struct ShadedHit<'s> {
     pub met: Met<'s, 's>,
     shaded: Option<(&'s Block<'s>, &'s Sets)>,
+    /// Random numbers for roulette, if they are of a sequence.
+    roulette: Option<&'s Row>,
     i: usize,
 }
 
@@ -86,6 +89,12 @@ impl ShadedHit<'_> {
         })
     }
 
+    /// Random number of Russian roulette at the vertex; `number` draws it where it is not known.
+    #[inline]
+    pub(crate) fn roulette(&self, number: impl FnOnce() -> f32) -> f32 {
+        self.roulette.map_or_else(number, |row| row[self.i & 15])
+    }
+
     /// BSDF sample of the vertex; `sample` takes it without lanes.
     #[inline]
     pub(crate) fn scattered(&self, sample: impl FnOnce() -> Option<BsdfSample>) -> Option<BsdfSample> {
@@ -96,7 +105,7 @@ impl ShadedHit<'_> {
 impl<'a> Shading<'a> {
     /// Without vertices.
     pub(crate) fn new() -> Self {
-        Self { block: Block::new(), sets: Sets::default(), has: 0 }
+        Self { block: Block::new(), sets: Sets::default(), has: 0, drawn: 0 }
     }
 
     /// Advances all subpaths of `rays` by a segment. `numbers` gives the segments of the subpath of a tag,
@@ -126,7 +135,10 @@ impl<'a> Shading<'a> {
             let (ray, hit, of_block) = (rays[i], hits[i], i % BLOCK);
             let is_shaded = self.has >> of_block & 1 == 1;
             let shaded = is_shaded.then_some((&self.block, &self.sets));
-            let shaded = ShadedHit { met: self.block.points.at(of_block), shaded, i: of_block };
+            let roulette =
+                ((self.has & self.drawn) >> of_block & 1 == 1).then_some(&self.block.numbers.roulette);
+            let met = self.block.points.at(of_block);
+            let shaded = ShadedHit { met, shaded, roulette, i: of_block };
             if let Some(next) = step(subpaths, i, (&ray, &hit, shaded), counters) {
                 rays[left] = Ray { tag: ray.tag, ..next };
                 left += 1;
@@ -142,9 +154,10 @@ impl<'a> Shading<'a> {
         rays: &[Ray],
         numbers: impl Fn(u32) -> Option<(u32, VertexNumbers)>,
     ) {
-        let Self { block, sets, has } = self;
+        let Self { block, sets, has, drawn } = self;
         let (level, lights) = (context.level, &context.lights);
-        let (mut lit, mut onward, mut drawn, mut lobe): (u32, u32, u32, Row) = (0, 0, 0, [0.0; BLOCK]);
+        let (mut lit, mut onward, mut lobe): (u32, u32, Row) = (0, 0, [0.0; BLOCK]);
+        *drawn = 0;
         let (stage, filled) = block.fill::<F>(context.scene, |block, i| {
             let (segments, numbers) = rays.get(i).and_then(|ray| numbers(ray.tag))?;
             // Paths that may be trapped by total reflection are shaded one by one.
@@ -155,7 +168,7 @@ impl<'a> Shading<'a> {
             match numbers {
                 VertexNumbers::Sequence(place) => {
                     (block.samples.place[i], block.samples.index[i]) = place;
-                    (lit, onward, drawn) = (lit | one, onward | one, drawn | one);
+                    (lit, onward, *drawn) = (lit | one, onward | one, *drawn | one);
                 }
                 VertexNumbers::Given { light, scattering } => {
                     if let Some([u, v, choice]) = light {
@@ -177,12 +190,12 @@ impl<'a> Shading<'a> {
             return;
         }
         let stage = block.see(level, stage);
-        let stage = match drawn {
+        let stage = match *drawn {
             0 => Block::keep_numbers(stage),
             _ => block.number(level, stage, lights.has_many_lights()),
         };
         block.reach_lights(context, &stage, lit);
-        *sets = if drawn == 0 {
+        *sets = if *drawn == 0 {
             block.sample_by_numbers::<F>(level, &stage, &lobe, onward)
         } else {
             let mut sets = block.sample_bsdfs::<F>(level, &stage, onward);

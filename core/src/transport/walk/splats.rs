@@ -47,6 +47,7 @@ impl<'w> SplatQueue<'w> {
     }
 
     /// Adds a splat of light of a `rest`. Traces the others before if there is no room.
+    #[inline]
     pub(crate) fn push<F: Features>(
         &mut self,
         sample: LensSample,

@@ -99,6 +99,7 @@ impl<F: Features> Walk<'_, F> {
     }
 
     /// A camera subpath through `raster`.
+    #[inline]
     pub(crate) fn start_at_camera(&self, raster: Vec2, lens: [f32; 2]) -> (Subpath, Ray) {
         let ray = self.context.scene.camera.ray(self.size[0], self.size[1], raster.x, raster.y, lens);
         let origin = Origin { triangle: MISS, crossings: 0 };
@@ -151,6 +152,7 @@ impl<F: Features> Walk<'_, F> {
     }
 
     /// Sums at the first vertex of a camera subpath.
+    #[inline]
     fn sums_from_camera(&self, vertex: &Vertex, lens: [f32; 2]) -> Sums {
         let ([width, height], Scatterer { point, bsdf }) = (self.size, vertex.at);
         let seen = self.context.scene.camera.project(width, height, point.position, lens);
@@ -162,6 +164,7 @@ impl<F: Features> Walk<'_, F> {
 
     /// Sums at the first vertex of a light subpath from `origin` on `light`: both densities of the light as
     /// they are from there.
+    #[inline]
     pub(crate) fn sums_from_light(&self, (light, origin): (u32, Vec3), vertex: &Vertex) -> Sums {
         let Self { context, emission, counts, .. } = self;
         let (at, to_light) = (vertex.at, vertex.back);

@@ -74,6 +74,7 @@ impl Arrival {
     /// From a caster, or from a rough vertex at this `squared` distance to one whose merges count η, by
     /// `MergeRadii::near`: about there merges and connections are as good as each other. `None` where light
     /// is not merged.
+    #[inline]
     pub(crate) fn of(from_caster: bool, squared: f32, near: f32) -> Option<Self> {
         match from_caster {
             true => Some(Arrival::FromCaster),
@@ -82,6 +83,7 @@ impl Arrival {
     }
 
     /// True if light is merged that comes so to the vertex at the end of segment `segments` of a camera path.
+    #[inline]
     pub(crate) fn is_merged(self, segments: u32) -> bool {
         self == Arrival::FromCaster || segments > 1
     }
@@ -90,6 +92,7 @@ impl Arrival {
 impl Sums {
     /// Sums of a light path that arrives at its first vertex, whose light has density `pdf_light` for a light
     /// sample there (a probability for lights without extent) and `emission` per étendue.
+    #[inline]
     pub(crate) fn at_light(
         counts: &Counts,
         pdf_light: f32,
@@ -106,11 +109,13 @@ impl Sums {
     }
 
     /// Sums of a camera path that leaves the lens by a ray of density `pdf_pixel` among those of its pixel.
+    #[inline]
     pub(crate) fn at_camera(counts: &Counts, pdf_pixel: f32) -> Self {
         Self { last: counts.light_paths / pdf_pixel, rest: 0.0, pending_merge: 0.0 }
     }
 
     /// At the end of a segment. The first segment of a light path is in [`Sums::at_light`].
+    #[inline]
     pub(crate) fn arrive(self, distance_squared: f32, cos_in: f32, is_delta: bool) -> Self {
         Self {
             last: if is_delta { 0.0 } else { self.last * distance_squared / cos_in },
@@ -120,12 +125,14 @@ impl Sums {
     }
 
     /// Sums of a camera path that can be merged at the vertex before, as this vertex shows.
+    #[inline]
     pub(crate) fn with_merge(self) -> Self {
         Self { rest: self.rest + self.pending_merge, pending_merge: 0.0, ..self }
     }
 
     /// After scattering with density `pdf`; `reverse` is the density of the opposite walk, `eta_vcm` the
     /// count of merges there if the vertex is rough.
+    #[inline]
     pub(crate) fn scatter(
         self,
         counts: &Counts,
@@ -143,6 +150,7 @@ impl Sums {
 
     /// After reflection or refraction by a delta lobe; `eta` is the index behind over that before, in the
     /// walk's direction. Refraction keeps n² dA cos dω.
+    #[inline]
     pub(crate) fn scatter_delta(self, cos_in: f32, eta: f32) -> Self {
         let factor = cos_in / (eta * eta);
         Self { last: 0.0, rest: self.rest * factor, pending_merge: self.pending_merge * factor }
@@ -150,6 +158,7 @@ impl Sums {
 
     /// All techniques of this subpath, where the opposite walk goes on with density `reverse` at the latest
     /// vertex.
+    #[inline]
     pub(crate) fn before(&self, reverse: f32) -> f32 {
         self.last + self.rest * reverse
     }
@@ -157,6 +166,7 @@ impl Sums {
 
 /// Weight of emission that a camera path hits, whose `sums` are those after its latest scattering. `pdf` is
 /// that of the direction, `None` after a delta lobe; `pdf_light` and `emission` as in [`Sums::at_light`].
+#[inline]
 pub(crate) fn weight_of_hit(
     counts: &Counts,
     sums: &Sums,
@@ -171,6 +181,7 @@ pub(crate) fn weight_of_hit(
 /// Weight of a light sample at a camera vertex with `sums` on arrival. `pdf` is the density with which the
 /// walk would hit the light, 0 if it cannot; `emission_per_pdf` the density of emission over that of the
 /// sample; `reverse` the density of the walk from the light through the vertex to the one before.
+#[inline]
 pub(crate) fn weight_of_light_sample(
     counts: &Counts,
     sums: &Sums,
@@ -206,6 +217,7 @@ impl End {
 }
 
 /// Weight of a connection of a camera vertex with a light vertex.
+#[inline]
 pub(crate) fn weight_of_connection(counts: &Counts, camera: &End, light: &End, distance_squared: f32) -> f32 {
     let per_area = |from: &End, to: &End| from.pdf * to.cos / distance_squared;
     let by_camera = per_area(camera, light) * light.before();
@@ -216,12 +228,14 @@ pub(crate) fn weight_of_connection(counts: &Counts, camera: &End, light: &End, d
 /// Weight of the splat of a light vertex. `pdf_area` is the density per area with which rays of the pixel
 /// meet it, `reverse` the density of the walk from the lens to the vertex before, `merge` the merge of the
 /// path, or 0.
+#[inline]
 pub(crate) fn weight_of_splat(counts: &Counts, sums: &Sums, pdf_area: f32, reverse: f32, merge: f32) -> f32 {
     weight(counts.light_paths, pdf_area * (sums.before(reverse) + merge))
 }
 
 /// Weight of the merge of two subpaths that have arrived at one vertex, in whose disc `eta_vcm` light paths
 /// are expected. Each has its sums and the density of the opposite walk to the vertex before.
+#[inline]
 pub(crate) fn weight_of_merge(
     eta_vcm: f32,
     (camera, pdf_to_camera): (&Sums, f32),
@@ -231,6 +245,7 @@ pub(crate) fn weight_of_merge(
 }
 
 /// `own` over the sum of `own` and `others`; 0 where that is not a number.
+#[inline]
 fn weight(own: f32, others: f32) -> f32 {
     let weight = own / (own + others);
     if weight.is_finite() { weight } else { 0.0 }

@@ -66,6 +66,7 @@ pub(crate) struct LensSample {
 
 impl<F: Features> Walk<'_, F> {
     /// Light of the environment that a camera subpath hits in `direction`.
+    #[inline]
     pub(crate) fn escape(&self, subpath: &Subpath, direction: Vec3) -> Option<Weighted> {
         let Self { context, emission, .. } = self;
         let (scene, lights) = (context.scene, &context.lights);
@@ -80,6 +81,7 @@ impl<F: Features> Walk<'_, F> {
     }
 
     /// Light of the surface that a camera subpath hits.
+    #[inline]
     pub(crate) fn emission(
         &self,
         subpath: &Subpath,
@@ -126,6 +128,7 @@ impl<F: Features> Walk<'_, F> {
     }
 
     /// Samples a light at `vertex` by the numbers `u`, without lanes.
+    #[inline]
     pub(crate) fn sample_light(&self, vertex: &Vertex, u: [f32; 3]) -> Option<Lit> {
         let (context, point) = (&self.context, vertex.at.point);
         let normal = vertex.at.normal_for_lights();
@@ -166,6 +169,7 @@ impl<F: Features> Walk<'_, F> {
     }
 
     /// Segment from `vertex` of a camera subpath to `position`, if light that comes along it is scattered.
+    #[inline]
     pub(crate) fn link(&self, vertex: &Vertex, position: Vec3) -> Option<Link> {
         let point = vertex.at.point;
         let between = position - point.position;
@@ -185,6 +189,7 @@ impl<F: Features> Walk<'_, F> {
     /// Connection of a camera subpath at `vertex` by `link` with the `end` of a light subpath: its shadow
     /// ray, and its light if nothing is in the way. `merges` gives the merges of the path on the side of the
     /// camera and on that of the light, where the light walk goes back with a density.
+    #[inline]
     pub(crate) fn connection(
         &self,
         (subpath, vertex): (&Subpath, &Vertex),
@@ -218,6 +223,7 @@ impl<F: Features> Walk<'_, F> {
 
     /// Splat of the `end` of a light subpath, if the picture has a pixel there. `lens` gives two random
     /// numbers, `merge` the merge of the path where the light walk goes back with a density.
+    #[inline]
     pub(crate) fn splat(
         &self,
         LightEnd { vertex, power, path_sums, .. }: &LightEnd,

@@ -26,6 +26,7 @@ pub(crate) struct Scatterer<'v> {
 }
 
 /// Direction in the frame of the other side of a surface.
+#[inline]
 fn flipped(direction: Vec3) -> Vec3 {
     Vec3::new(direction.x, direction.y, -direction.z)
 }
@@ -52,6 +53,7 @@ impl Scatterer<'_> {
     }
 
     /// BSDF on the other side.
+    #[inline]
     fn behind<F: Features>(&self, context: &SceneContext<F>) -> Bsdf {
         let point = self.point;
         Bsdf::at::<F>(context.scene, point.material, point.uv, !point.front)
@@ -59,6 +61,7 @@ impl Scatterer<'_> {
 
     /// Scattering between local directions `wo` to the camera and `wi` to the light, on the side of the
     /// camera.
+    #[inline]
     pub(crate) fn scattering<F: Features>(
         &self,
         context: &SceneContext<F>,
@@ -70,6 +73,7 @@ impl Scatterer<'_> {
     }
 
     /// Scattering on the side of the light, as a light path has it.
+    #[inline]
     pub(crate) fn scattering_from_light<F: Features>(
         &self,
         context: &SceneContext<F>,
@@ -88,6 +92,7 @@ impl Scatterer<'_> {
 
     /// Density of the walk opposite to one that came by `from` and left by `to`, both local on the side of
     /// `from`.
+    #[inline]
     pub(crate) fn reverse_pdf<F: Features>(&self, context: &SceneContext<F>, from: Vec3, to: Vec3) -> f32 {
         if to.z > 0.0 {
             return self.bsdf.evaluate::<F>(to, from).1;
@@ -100,6 +105,7 @@ impl Scatterer<'_> {
 
     /// Kind of the light number `light`, seen in direction `to_light` with `origin` on it: the density of its
     /// light sample (a probability for lights without extent), and that of its emission per étendue.
+    #[inline]
     pub(crate) fn densities_of_light<F: Features>(
         &self,
         context: &SceneContext<F>,
