@@ -3,7 +3,7 @@
 //! so that the tracer sees batches of rays.
 
 use crate::Rgb;
-use crate::bsdf::{BsdfSample, Features};
+use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use crate::geometry::{Hit, Ray};
@@ -19,7 +19,7 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::shading::{ShadedHit, Shading, VertexNumbers};
 use crate::transport::walk::shadow_tag::ShadowTag;
-use crate::transport::walk::subpath::Walk;
+use crate::transport::walk::subpath::{Next, Walk};
 use crate::transport::walk::sums::{Arrival, Counts};
 use crate::transport::walk::vertex::Scatterer;
 use crate::transport::walk::visibility::ShadowRays;
@@ -218,9 +218,10 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 *drawn = vertices.get(*index as usize).copied().unwrap_or_default();
             }
             let numbers = |paths: &[CameraPath], tag: u32| {
-                let CameraPath { subpath, pixel, .. } = paths.get(tag as usize)?;
-                let numbers = || VertexNumbers::Sequence(Sampler::place(seed, *pixel, sample));
-                (subpath.segments < max_depth).then(|| (subpath.segments, numbers()))
+                let CameraPath { subpath, pixel, eta_squared, .. } = paths.get(tag as usize)?;
+                let place = Sampler::place(seed, *pixel, sample);
+                let numbers = VertexNumbers::Path(place, subpath.throughput, *eta_squared);
+                (subpath.segments < max_depth).then_some((subpath.segments, numbers))
             };
             let traced = (&mut rays[..active], &mut hits[..active], coherence);
             active = shading.advance(context, traced, counters, paths, numbers, |paths, i, end, counters| {
@@ -294,11 +295,13 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 self.connect(path, &at, drawn, ray.tag, queue);
             }
         }
-        let sample = || bsdf.sample::<F>(vertex.wo, dimension::bsdf_sample(&sampler, segments));
-        let sample = shaded.scattered(sample)?;
-        let first = dimension::vertex(segments);
-        let roulette = || shaded.roulette(|| sampler.single(first + dimension::ROULETTE));
-        self.scatter(path, &at, &sample, roulette, counters)
+        let next = shaded.next(|| {
+            let sample = bsdf.sample::<F>(vertex.wo, dimension::bsdf_sample(&sampler, segments))?;
+            let roulette = || sampler.single(dimension::vertex(segments) + dimension::ROULETTE);
+            let next = walk.next((&path.subpath, path.eta_squared), vertex, sample, roulette)?;
+            Some(next.0)
+        })?;
+        self.scatter(path, &at, &next, counters)
     }
 
     /// The vertex where the path arrives.
@@ -330,30 +333,28 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         CameraVertex { vertex, is_first_rough, eta_vcm, sampler }
     }
 
-    /// The path goes on by a `sample` of the BSDF. Its next ray.
+    /// The path goes on to `next`. Its ray.
     #[inline]
     fn scatter(
         &self,
         path: &mut CameraPath,
         CameraVertex { vertex, eta_vcm, .. }: &CameraVertex,
-        sample: &BsdfSample,
-        roulette: impl FnOnce() -> f32,
+        next: &Next,
         counters: &mut Counters,
     ) -> Option<Ray> {
-        let mut vertex = *vertex;
-        if sample.delta {
+        let (mut vertex, is_delta) = (*vertex, next.sample.delta);
+        if is_delta {
             // The next vertex is behind a caster.
             vertex.sums = vertex.sums.with_merge();
         }
         let is_rough = !vertex.at.bsdf.is_caustic_caster();
-        let sample_and_merges = (sample, is_rough.then_some(*eta_vcm));
         let at = (&mut path.subpath, &mut path.eta_squared);
-        let (next, _) = self.walk.go_on(at, &vertex, sample_and_merges, roulette, counters)?;
-        path.eta_vcm = if sample.delta { 0.0 } else { *eta_vcm };
-        path.has_rough |= u32::from(is_rough && !sample.delta);
-        if sample.delta {
+        let ray = self.walk.go_on(at, &vertex, next, is_rough.then_some(*eta_vcm), counters)?;
+        path.eta_vcm = if is_delta { 0.0 } else { *eta_vcm };
+        path.has_rough |= u32::from(is_rough && !is_delta);
+        if is_delta {
             path.history = path.history.by_coat();
         }
-        Some(next)
+        Some(ray)
     }
 }

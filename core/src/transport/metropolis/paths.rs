@@ -228,10 +228,9 @@ impl<'a, F: Features> Paths<'a, F> {
             }
         }
         let sample = shaded.scattered(|| bsdf.sample::<F>(vertex.wo, numbers.scattering(segments)))?;
-        let (subpath, roulette) = (&mut path.subpath, || shaded.roulette(|| numbers.roulette(segments)));
-        let at = (subpath, &mut path.eta_squared);
-        let (next, survival) = walk.go_on(at, &vertex, (&sample, None), roulette, counters)?;
+        let at = (&path.subpath, path.eta_squared);
+        let (next, survival) = walk.next(at, &vertex, sample, || numbers.roulette(segments))?;
         path.survival *= survival;
-        Some(next)
+        walk.go_on((&mut path.subpath, &mut path.eta_squared), &vertex, &next, None, counters)
     }
 }

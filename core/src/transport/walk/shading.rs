@@ -12,15 +12,19 @@ use crate::transport::walk::block::Block;
 use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::points::Met;
+use crate::transport::walk::subpath::Next;
 use crate::transport::walk::techniques::Lit;
 use crate::transport::walk::termination::TRAPPED_FROM;
 use glam::Vec3;
-use halflight_simd::kernels::shade::{BLOCK, Row, at};
+use halflight_simd::kernels::shade::{BLOCK, Row, at, put};
 
 /// Random numbers of a vertex in lanes.
 pub(crate) enum VertexNumbers {
     /// Those of a sequence, by its place and the index of its point: of a light sample and of scattering.
     Sequence((u64, u32)),
+    /// The same for a path of this throughput and this product of squared relative indices of refraction,
+    /// whose next ray is computed in lanes, too.
+    Path((u64, u32), [f32; 3], f32),
     /// Numbers of a light sample, and of scattering, if the vertex takes them.
     Given {
         /// Point on a light and choice of the light.
@@ -34,9 +38,8 @@ pub(crate) enum VertexNumbers {
 pub(crate) struct Shading<'a> {
     block: Block<'a>,
     sets: Sets,
-    /// Set of vertices in lanes, and of those whose numbers are of a sequence.
+    /// Set of vertices in lanes.
     has: u32,
-    drawn: u32,
 }
 
 /// Hit of a block, with its samples if it was shaded in lanes.
@@ -44,8 +47,6 @@ pub(crate) struct Shading<'a> {
 pub(crate) struct ShadedHit<'s> {
     pub met: Met<'s, 's>,
     shaded: Option<(&'s Block<'s>, &'s Sets)>,
-    /// Random numbers for roulette, if they are of a sequence.
-    roulette: Option<&'s Row>,
     i: usize,
 }
 
@@ -89,10 +90,27 @@ impl ShadedHit<'_> {
         })
     }
 
-    /// Random number of Russian roulette at the vertex; `number` draws it where it is not known.
+    /// Continuation of the path of [`VertexNumbers::Path`]; `next` computes it without lanes.
     #[inline]
-    pub(crate) fn roulette(&self, number: impl FnOnce() -> f32) -> f32 {
-        self.roulette.map_or_else(number, |row| row[self.i & 15])
+    pub(crate) fn next(&self, next: impl FnOnce() -> Option<Next>) -> Option<Next> {
+        let Some((block, sets)) = self.shaded else { return next() };
+        let i = self.i & 15;
+        let is_in = |set: u32| set >> i & 1 == 1;
+        if !is_in(block.next.exists) {
+            return None;
+        }
+        let ([r, g, b, pdf, .., eta_squared], [.., x, y, z, _]) = (block.next.states[i], block.next.rays[i]);
+        let direction = Vec3::from(at(&block.next.local, i));
+        let sample = BsdfSample {
+            direction,
+            weight: Rgb::ONE,
+            pdf,
+            delta: is_in(sets.delta),
+            transmitted: direction.z < 0.0,
+            eta: block.given.eta[i],
+        };
+        let (towards, throughput) = (Vec3::new(x, y, z), Rgb::new(r, g, b));
+        Some(Next { sample, towards, throughput, eta_squared, is_cut: is_in(sets.cut) })
     }
 
     /// BSDF sample of the vertex; `sample` takes it without lanes.
@@ -105,7 +123,7 @@ impl ShadedHit<'_> {
 impl<'a> Shading<'a> {
     /// Without vertices.
     pub(crate) fn new() -> Self {
-        Self { block: Block::new(), sets: Sets::default(), has: 0, drawn: 0 }
+        Self { block: Block::new(), sets: Sets::default(), has: 0 }
     }
 
     /// Advances all subpaths of `rays` by a segment. `numbers` gives the segments of the subpath of a tag,
@@ -135,10 +153,7 @@ impl<'a> Shading<'a> {
             let (ray, hit, of_block) = (rays[i], hits[i], i % BLOCK);
             let is_shaded = self.has >> of_block & 1 == 1;
             let shaded = is_shaded.then_some((&self.block, &self.sets));
-            let roulette =
-                ((self.has & self.drawn) >> of_block & 1 == 1).then_some(&self.block.numbers.roulette);
-            let met = self.block.points.at(of_block);
-            let shaded = ShadedHit { met, shaded, roulette, i: of_block };
+            let shaded = ShadedHit { met: self.block.points.at(of_block), shaded, i: of_block };
             if let Some(next) = step(subpaths, i, (&ray, &hit, shaded), counters) {
                 rays[left] = Ray { tag: ray.tag, ..next };
                 left += 1;
@@ -154,10 +169,10 @@ impl<'a> Shading<'a> {
         rays: &[Ray],
         numbers: impl Fn(u32) -> Option<(u32, VertexNumbers)>,
     ) {
-        let Self { block, sets, has, drawn } = self;
+        let Self { block, sets, has } = self;
         let (level, lights) = (context.level, &context.lights);
-        let (mut lit, mut onward, mut lobe): (u32, u32, Row) = (0, 0, [0.0; BLOCK]);
-        *drawn = 0;
+        let (mut lit, mut onward, mut drawn, mut lobe): (u32, u32, u32, Row) = (0, 0, 0, [0.0; BLOCK]);
+        let mut has_next = false;
         let (stage, filled) = block.fill::<F>(context.scene, |block, i| {
             let (segments, numbers) = rays.get(i).and_then(|ray| numbers(ray.tag))?;
             // Paths that may be trapped by total reflection are shaded one by one.
@@ -168,7 +183,14 @@ impl<'a> Shading<'a> {
             match numbers {
                 VertexNumbers::Sequence(place) => {
                     (block.samples.place[i], block.samples.index[i]) = place;
-                    (lit, onward, *drawn) = (lit | one, onward | one, *drawn | one);
+                    (lit, onward, drawn) = (lit | one, onward | one, drawn | one);
+                }
+                VertexNumbers::Path(place, throughput, eta_squared) => {
+                    (block.samples.place[i], block.samples.index[i]) = place;
+                    put(&mut block.throughput, i, throughput);
+                    block.eta_squared[i] = eta_squared;
+                    has_next = true;
+                    (lit, onward, drawn) = (lit | one, onward | one, drawn | one);
                 }
                 VertexNumbers::Given { light, scattering } => {
                     if let Some([u, v, choice]) = light {
@@ -190,16 +212,20 @@ impl<'a> Shading<'a> {
             return;
         }
         let stage = block.see(level, stage);
-        let stage = match *drawn {
+        let stage = match drawn {
             0 => Block::keep_numbers(stage),
             _ => block.number(level, stage, lights.has_many_lights()),
         };
         block.reach_lights(context, &stage, lit);
-        *sets = if *drawn == 0 {
+        *sets = if drawn == 0 {
             block.sample_by_numbers::<F>(level, &stage, &lobe, onward)
         } else {
             let mut sets = block.sample_bsdfs::<F>(level, &stage, onward);
-            block.sample_all(level, &mut sets);
+            if has_next {
+                block.scatter(level, &sets);
+            } else {
+                block.sample_all(level, &mut sets);
+            }
             sets
         };
     }

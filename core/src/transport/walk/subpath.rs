@@ -59,6 +59,17 @@ impl Subpath {
     }
 }
 
+/// Continuation of a camera path that has survived.
+pub(crate) struct Next {
+    pub sample: BsdfSample,
+    /// Direction of the sample in the world.
+    pub towards: Vec3,
+    pub throughput: Rgb,
+    pub eta_squared: f32,
+    /// True if the path is too long.
+    pub is_cut: bool,
+}
+
 /// A vertex that a subpath has arrived at.
 #[derive(Clone, Copy)]
 pub(crate) struct Vertex<'v> {
@@ -192,28 +203,43 @@ impl<F: Features> Walk<'_, F> {
         subpath.leave(vertex, (sample, towards), throughput, sums)
     }
 
-    /// A camera path goes on from `vertex` by a `sample` of the BSDF, if it survives Russian roulette. Its next
-    /// ray, and the probability of survival. `eta_squared` is the product of the squared relative indices of
+    /// Continuation of a camera path from `vertex` by a `sample` of the BSDF, if it survives Russian roulette,
+    /// and the probability of survival. `eta_squared` is the product of its squared relative indices of
     /// refraction so far.
+    #[inline]
+    pub(crate) fn next(
+        &self,
+        (subpath, eta_squared): (&Subpath, f32),
+        vertex: &Vertex,
+        sample: BsdfSample,
+        roulette: impl FnOnce() -> f32,
+    ) -> Option<(Next, f32)> {
+        let (segments, towards) = (subpath.segments, vertex.at.towards(&sample)?);
+        let throughput = Rgb::from(subpath.throughput) * sample.weight;
+        let eta_squared = eta_squared * (sample.eta * sample.eta);
+        let survival = survive(segments, throughput * eta_squared, roulette)?;
+        let is_cut = is_cut(segments, vertex.at.bsdf, &sample);
+        let throughput = throughput / survival;
+        Some((Next { sample, towards, throughput, eta_squared, is_cut }, survival))
+    }
+
+    /// A camera path goes on from `vertex` to `next`: its ray. `eta_vcm` is the number of merges if the vertex
+    /// is rough.
     #[inline]
     pub(crate) fn go_on(
         &self,
         (subpath, eta_squared): (&mut Subpath, &mut f32),
         vertex: &Vertex,
-        (sample, eta_vcm): (&BsdfSample, Option<f32>),
-        roulette: impl FnOnce() -> f32,
+        next: &Next,
+        eta_vcm: Option<f32>,
         counters: &mut Counters,
-    ) -> Option<(Ray, f32)> {
-        let (segments, towards) = (subpath.segments, vertex.at.towards(sample)?);
-        let throughput = Rgb::from(subpath.throughput) * sample.weight;
-        *eta_squared *= sample.eta * sample.eta;
-        let survival = survive(segments, throughput * *eta_squared, roulette)?;
-        let ray = self.scatter(subpath, vertex, (sample, towards), throughput / survival, eta_vcm)?;
-        if is_cut(segments, vertex.at.bsdf, sample) {
+    ) -> Option<Ray> {
+        if next.is_cut {
             counters.dropped.unfinished += 1;
             return None;
         }
-        Some((ray, survival))
+        *eta_squared = next.eta_squared;
+        self.scatter(subpath, vertex, (&next.sample, next.towards), next.throughput, eta_vcm)
     }
 
     /// Sums behind `vertex`, of the techniques of some counts that have `sums` on arrival.
