@@ -10,12 +10,11 @@ use crate::transport::walk::termination::TRAPPED_FROM;
 use halflight_simd::kernels::shade::specular::SpecularBlock;
 use halflight_simd::kernels::shade::{BLOCK, put};
 
-/// First stage of a block: BSDFs are put in. The stages are proofs that a block has passed those before; each
-/// function of a block takes the stage that it needs, so that another order does not compile. Some need their
-/// own proof of a stage, which ends it:
+/// First stage of a block: BSDFs are put in.
 ///
-/// [`Block::clear`], [`Block::put`] for each vertex, [`Block::see`], [`Block::number`], and then light samples
-/// and samples of BSDFs in any order.
+/// A stage is the proof that a block has passed those before. Functions of a block borrow the stage that they
+/// need, or take it if they end it, so that another order does not compile: [`Block::clear`], [`Block::put`]
+/// for each vertex, [`Block::see`], [`Block::number`], and then samples of lights and BSDFs in any order.
 pub(crate) struct Cleared(());
 
 /// Second stage: all BSDFs are known.

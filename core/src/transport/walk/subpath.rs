@@ -203,9 +203,9 @@ impl<F: Features> Walk<'_, F> {
         subpath.leave(vertex, (sample, towards), throughput, sums)
     }
 
-    /// Continuation of a camera path from `vertex` by a `sample` of the BSDF, if it survives Russian roulette,
-    /// and the probability of survival. `eta_squared` is the product of its squared relative indices of
-    /// refraction so far.
+    /// Continuation of a camera path from `vertex` by a `sample` of the BSDF, and the probability of its
+    /// survival; `None` if Russian roulette ends it. `eta_squared` is the product of its squared relative
+    /// indices of refraction so far.
     #[inline]
     pub(crate) fn next(
         &self,
@@ -223,8 +223,8 @@ impl<F: Features> Walk<'_, F> {
         Some((Next { sample, towards, throughput, eta_squared, is_cut }, survival))
     }
 
-    /// A camera path goes on from `vertex` to `next`: its ray. `eta_vcm` is the number of merges if the vertex
-    /// is rough.
+    /// A camera path goes on from `vertex` to `next`: its ray. `eta_vcm` is the number of merges if the
+    /// vertex is rough.
     #[inline]
     pub(crate) fn go_on(
         &self,

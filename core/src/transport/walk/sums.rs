@@ -6,10 +6,10 @@
 //! balance heuristic divides the count times the density of a technique by the sum over all of them, which
 //! the three numbers of [`Sums`] of both subpaths give.
 //!
-//! A path is merged at one vertex at most (`bidirectional/merging.rs`): the first rough one from the camera, if the vertex
-//! before it on the way from the light is a caster or near. Neither subpath knows both sides, so the merge
-//! has a number of its own, `pending_merge`: the next rough vertex of a light path replaces it, and a camera
-//! path adds it to `rest` if its next vertex is a caster or near.
+//! A path is merged at one vertex at most (`bidirectional/merging.rs`): the first rough one from the camera,
+//! if the vertex before it on the way from the light is a caster or near. Neither subpath knows both sides,
+//! so the merge has a number of its own, `pending_merge`: the next rough vertex of a light path replaces it,
+//! and a camera path adds it to `rest` if its next vertex is a caster or near.
 //!
 //! p is the density per solid angle with which a walk goes on, p← that of the opposite walk, c a cosine to
 //! the geometric normal, d a distance, e the density of emission per étendue (`light/emission/pdf.rs`), q the

@@ -45,7 +45,8 @@ impl Scatterer<'_> {
         self.point.sides_agree(sample.direction, towards).then_some(towards)
     }
 
-    /// Sample of the BSDF by `u` for a path that arrives by `direction`, and the direction in which it goes on.
+    /// Sample of the BSDF by `u` for a path that arrives by `direction`, and the direction in which it goes
+    /// on.
     #[inline]
     pub(crate) fn sample<F: Features>(&self, direction: Vec3, u: [f32; 3]) -> Option<(BsdfSample, Vec3)> {
         let sample = self.bsdf.sample::<F>(self.point.frame.to_local(-direction), u)?;

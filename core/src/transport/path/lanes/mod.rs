@@ -3,8 +3,8 @@
 //! A stage is either a kernel over all vertices of the block or a loop over them. Loops gather inputs, look
 //! up materials, textures, cells of an environment map and estimators, and replace the kernels at rare
 //! vertices: normal maps, degenerate triangles, rough dielectrics, textured, point and directional lights.
-//! Vertices at which an estimator weighs samples are shaded one by one (`path/scalar.rs`), as all are at levels
-//! without lanes. Both compute the same bits.
+//! Vertices at which an estimator weighs samples are shaded one by one (`path/scalar.rs`), as all are at
+//! levels without lanes. Both compute the same bits.
 
 mod direct;
 mod scatter;
