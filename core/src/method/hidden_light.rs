@@ -9,7 +9,7 @@ use crate::estimate::{ErrorEstimate, RELMSE_OFFSET};
 use crate::light::{EmissionSampler, GuideStats};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::photon_mapping::hidden::{
-    HiddenLightTracer, PATHS_PER_TASK, Techniques, VERTICES_PER_TASK, may_be_hidden,
+    HiddenLightTracer, PATHS_PER_TASK, Techniques, VERTICES_PER_TASK,
 };
 use crate::transport::photon_mapping::visible_points::VisiblePointSampler;
 
@@ -91,7 +91,7 @@ impl HiddenLight {
 
     /// True if a method without photons may lack light of the scene.
     pub fn is_possible<F: Features>(context: &RenderContext) -> bool {
-        caustics::are_possible(context.scene) && may_be_hidden(&context.scene_context::<F>())
+        caustics::are_possible(context.scene) && context.scene_context::<F>().has_hidden_light()
     }
 
     /// Light that a method with these `techniques` lacks; `None` without any, or where there is no memory to

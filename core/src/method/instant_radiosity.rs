@@ -17,7 +17,7 @@ use crate::findings::{Finding, Findings, Value};
 use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::instant_radiosity::light_pass::{
-    LightPass, PATHS_PER_TASK, SetOutput, VERTICES_PER_TASK, has_hidden_caustics,
+    LightPass, PATHS_PER_TASK, TaskOutput, VERTICES_PER_TASK,
 };
 use crate::transport::instant_radiosity::lighting::VirtualLighting;
 use crate::transport::instant_radiosity::lights::{VirtualLight, lit_area};
@@ -94,7 +94,7 @@ pub struct InstantRadiosity<'a, F> {
     emission: EmissionSampler<'a>,
     /// Room for [`VERTICES_PER_TASK`] virtual lights of each set, and the outcome of its task.
     lights: &'a mut [VirtualLight],
-    outputs: &'a mut [SetOutput],
+    outputs: &'a mut [TaskOutput],
     /// Splats of each set, and of the sample in the order of the film; none where nothing needs them.
     splats: &'a mut [Splat],
     picture: &'a mut [[f32; 3]],
@@ -129,7 +129,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         let splats = if has_splats { sets * PATHS_PER_TASK } else { 0 };
         Footprint::default()
             .slice::<VirtualLight>(sets * VERTICES_PER_TASK)
-            .slice::<SetOutput>(sets)
+            .slice::<TaskOutput>(sets)
             .slice::<Splat>(splats)
     }
 
@@ -165,7 +165,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         let PathSettings { width, height, max_depth, .. } = context.settings;
         let tiles = if is_clamped { Tile::count(width, height) } else { 0 };
         let cut = slice("cut light", tiles, memory)?;
-        let has_splats = has_hidden_caustics(&context.scene_context::<F>());
+        let has_splats = context.scene_context::<F>().has_hidden_light();
         let guide = GuideSettings {
             filter: PhotonFilter::All,
             max_depth,
@@ -233,14 +233,14 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
             return Ok(None);
         }
         let (splats, outputs) = (&**splats, &**outputs);
-        let lists = splats.chunks(PATHS_PER_TASK).zip(outputs.iter().map(SetOutput::offsets));
+        let lists = splats.chunks(PATHS_PER_TASK).zip(outputs.iter().map(TaskOutput::offsets));
         Ok(add_splats(executor, picture, lists)?.then_some(counters))
     }
 
     /// The virtual lights of tile `tile`.
     fn set(&self, tile: usize) -> &[VirtualLight] {
         let Some(set) = tile.checked_rem(self.outputs.len()) else { return &[] };
-        &self.lights[set * VERTICES_PER_TASK..][..self.outputs[set].lights as usize]
+        &self.lights[set * VERTICES_PER_TASK..][..self.outputs[set].vertices as usize]
     }
 
     fn lighting(&self, tile: usize, is_clamped: bool) -> VirtualLighting<'_> {
@@ -278,7 +278,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
         round.state.counters += counters;
         self.traced = Some(sample);
         self.used.light_paths += (self.outputs.len() * PATHS_PER_TASK) as u64;
-        self.used.lights += self.outputs.iter().map(|output| u64::from(output.lights)).sum::<u64>();
+        self.used.lights += self.outputs.iter().map(|output| u64::from(output.vertices)).sum::<u64>();
         if self.is_clamped() {
             self.estimate_cut(sample, round)?;
         }

@@ -38,7 +38,7 @@ use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::{Scene, SurfacePoint};
 use crate::transport::UNLIMITED;
-use crate::transport::path::reference::irradiance;
+use crate::transport::path::single::irradiance;
 use crate::{Level, Rgb};
 
 /// A scene that is ready for estimates of irradiance by path tracing.

@@ -9,26 +9,23 @@ use crate::bvh::Coherence;
 use crate::film::CIRCLE;
 use crate::geometry::{Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::Sampler;
+use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
-use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::context::{Origin, SceneContext};
+use crate::transport::walk::dimension;
 use crate::transport::walk::path_classes::PathClasses;
-use crate::transport::walk::termination::MAX_CROSSINGS;
+use crate::transport::walk::shadow_tag::ShadowTag;
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
+use halflight_simd::kernels::shade::BLOCK;
 
 /// Paths that advance together if memory allows: enough to fill batches of rays, few enough for the L2 cache.
 pub const WAVE: usize = 2048;
 
-/// Number of vertices that are shaded together.
-pub(in crate::transport) const BLOCK: usize = 16;
-
-/// Tag bit of shadow rays to the environment, whose radiance is looked up after arrival: most are occluded,
-/// and an environment map is large.
-pub(in crate::transport) const TO_ENVIRONMENT: u32 = 1 << 31;
-
 /// Shading by a method, called by the wavefront.
-pub(in crate::transport) trait Shade {
+pub(crate) trait Shade {
     /// Maximum number of shadow rays per vertex.
     fn shadow_rays(&self) -> usize;
 
@@ -43,41 +40,41 @@ pub(in crate::transport) trait Shade {
 pub struct PathState {
     // The first twelve words are those that shading writes as records of lanes.
     /// β, the factor from radiance at the hit of the ray to radiance in the pixel.
-    pub(in crate::transport) throughput: [f32; 3],
+    pub(crate) throughput: [f32; 3],
     /// Solid-angle pdf of the ray; infinite if no other technique can sample it.
-    pub(in crate::transport) pdf: f32,
+    pub(crate) pdf: f32,
     /// Position of the last scattering vertex.
-    pub(in crate::transport) position: [f32; 3],
+    pub(crate) position: [f32; 3],
     /// Product of the squared relative indices of refraction so far.
-    pub(in crate::transport) eta_squared: f32,
+    pub(crate) eta_squared: f32,
     /// Normal at `position` for light sampling.
-    pub(in crate::transport) normal: [f32; 3],
+    pub(crate) normal: [f32; 3],
     /// Triangle at the origin of the ray, which the ray cannot hit again.
-    pub(in crate::transport) triangle: u32,
+    pub(crate) triangle: u32,
     /// L, the radiance that the path has found so far.
-    pub(in crate::transport) radiance: [f32; 3],
+    pub(crate) radiance: [f32; 3],
     /// Index of the pixel in the picture.
-    pub(in crate::transport) pixel: u32,
+    pub(crate) pixel: u32,
     /// Part of `radiance` that is blur of density estimates.
-    pub(in crate::transport) blur: [f32; 3],
+    pub(crate) blur: [f32; 3],
     /// Index of the pixel in its tile.
-    pub(in crate::transport) place: u32,
+    pub(crate) place: u32,
     /// Sample number of the pixel.
-    pub(in crate::transport) sample: u32,
+    pub(crate) sample: u32,
     /// Segments traced, including the current one.
-    pub(in crate::transport) segments: u16,
+    pub(crate) segments: u16,
     /// Number of skipped surfaces.
-    pub(in crate::transport) crossings: u16,
+    pub(crate) crossings: u16,
     /// Classes of light that the path has to find behind its ray.
-    pub(in crate::transport) classes: PathClasses,
+    pub(crate) classes: PathClasses,
     /// Length of the path from the camera to its last vertex.
-    pub(in crate::transport) travelled: f32,
+    pub(crate) travelled: f32,
 }
 
 impl PathState {
     /// Path before its first segment: sample `sample` of pixel `pixel` of the picture, at `place` in its
     /// tile.
-    pub(in crate::transport) fn new(pixel: u32, place: u32, sample: u32, classes: PathClasses) -> Self {
+    pub(crate) fn new(pixel: u32, place: u32, sample: u32, classes: PathClasses) -> Self {
         let mut path = Self::default();
         path.begin(pixel, place, sample, classes);
         path
@@ -86,7 +83,7 @@ impl PathState {
     /// Replaces the path by [`PathState::new`]. In its slot of the wave, field by field: a copy of the whole
     /// would wait for the narrow fields.
     #[inline]
-    pub(in crate::transport) fn begin(&mut self, pixel: u32, place: u32, sample: u32, classes: PathClasses) {
+    pub(crate) fn begin(&mut self, pixel: u32, place: u32, sample: u32, classes: PathClasses) {
         *self = Self::zeroed();
         (self.throughput, self.pdf) = ([1.0; 3], f32::INFINITY);
         (self.pixel, self.place, self.sample) = (pixel, place, sample);
@@ -96,103 +93,82 @@ impl PathState {
 
     /// Adds to the radiance of the path.
     #[inline]
-    pub(in crate::transport) fn add(&mut self, radiance: Rgb) {
+    pub(crate) fn add(&mut self, radiance: Rgb) {
         self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
     }
 
-    /// Continues with `next` behind the skipped `triangle`. `None` after [`MAX_CROSSINGS`] skipped surfaces.
-    #[cold]
-    pub(in crate::transport) fn skip_surface(
+    /// `Err` if the ray that `hit` a surface passes `point` there: the ray behind it, if there is one.
+    #[inline]
+    pub(crate) fn stop<F: Features>(
         &mut self,
-        next: Ray,
-        triangle: u32,
+        context: &SceneContext<F>,
+        (ray, hit): (&Ray, &Hit),
+        point: &SurfacePoint,
+        seed: u32,
         counters: &mut Counters,
-    ) -> Option<Ray> {
-        if u32::from(self.crossings) >= MAX_CROSSINGS {
-            counters.dropped.unfinished += 1;
-            return None;
-        }
-        self.crossings += 1;
-        self.triangle = triangle;
-        Some(next)
+    ) -> Result<(), Option<Ray>> {
+        let segments = u32::from(self.segments);
+        let mut origin = Origin { triangle: self.triangle, crossings: self.crossings.into() };
+        let sampler = Sampler::new(seed, self.pixel, self.sample);
+        let opacity = |crossings| sampler.single(dimension::opacity(segments, crossings));
+        let met = (ray, hit, point);
+        context.stop(&mut origin, met, segments == 1, opacity, counters).inspect_err(|_| {
+            (self.triangle, self.crossings) = (origin.triangle, origin.crossings as u16);
+        })
     }
 }
 
 /// Slices for `capacity` paths. The tag of a ray is the index of its path.
 pub struct Wavefront<'m> {
-    pub(in crate::transport) paths: &'m mut [PathState],
-    pub(in crate::transport) rays: &'m mut [Ray],
-    pub(in crate::transport) hits: &'m mut [Hit],
+    pub(crate) paths: &'m mut [PathState],
+    pub(crate) rays: &'m mut [Ray],
+    pub(crate) hits: &'m mut [Hit],
     /// Number of rays of the next segment, at the front of `rays`, while the current segment is shaded.
-    pub(in crate::transport) next: usize,
-    pub(in crate::transport) shadow_rays: &'m mut [Ray],
-    /// Unoccluded contribution of each shadow ray.
-    pub(in crate::transport) shadow_light: &'m mut [[f32; 3]],
-    /// Hits of shadow rays in scenes with cut-outs.
-    pub(in crate::transport) shadow_hits: &'m mut [Hit],
-    pub(in crate::transport) hidden: &'m mut [u8],
-    /// Number of shadow rays in the queue.
-    pub(in crate::transport) shadows: usize,
+    pub(crate) next: usize,
+    pub(crate) shadows: ShadowRays<'m>,
 }
 
 impl<'m> Wavefront<'m> {
     /// Number of paths of a wave of `capacity`: at least one circle of pixels.
-    pub(in crate::transport) const fn capacity(capacity: usize) -> usize {
+    pub(crate) const fn capacity(capacity: usize) -> usize {
         if capacity < CIRCLE { CIRCLE } else { capacity }
     }
 
     /// Footprint of [`Wavefront::new`].
-    pub(in crate::transport) fn footprint(capacity: usize) -> Footprint {
+    pub(crate) fn footprint(capacity: usize) -> Footprint {
         let capacity = Self::capacity(capacity);
         Footprint::default()
             .slice::<PathState>(capacity)
             .slice::<Ray>(capacity)
             .slice::<Hit>(capacity)
-            .slice::<Ray>(capacity)
-            .slice::<[f32; 3]>(capacity)
-            .slice::<Hit>(capacity)
-            .slice::<u8>(capacity)
+            .and(ShadowRays::footprint(capacity))
     }
 
     /// An empty wave.
-    pub(in crate::transport) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub(crate) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let capacity = Self::capacity(capacity);
         Ok(Self {
             paths: arena.slice(capacity)?,
             rays: arena.slice(capacity)?,
             hits: arena.slice(capacity)?,
             next: 0,
-            shadow_rays: arena.slice(capacity)?,
-            shadow_light: arena.slice(capacity)?,
-            shadow_hits: arena.slice(capacity)?,
-            hidden: arena.slice(capacity)?,
-            shadows: 0,
+            shadows: ShadowRays::new(capacity, arena)?,
         })
     }
 
     /// Queues `ray` of path `path`, in place of a shaded ray.
     #[inline]
-    pub(in crate::transport) fn push_ray(&mut self, path: usize, ray: Ray) {
+    pub(crate) fn push_ray(&mut self, path: usize, ray: Ray) {
         if let Some(slot) = self.rays.get_mut(self.next) {
             *slot = Ray { tag: path as u32, ..ray };
             self.next += 1;
-        }
-    }
-
-    /// Queues a shadow ray with its contribution `light`.
-    #[inline]
-    pub(in crate::transport) fn push_shadow_ray(&mut self, ray: Ray, light: Rgb) {
-        let slots = (self.shadow_rays.get_mut(self.shadows), self.shadow_light.get_mut(self.shadows));
-        if let (Some(slot), Some(contribution)) = slots {
-            (*slot, *contribution) = (ray, light.to_array());
-            self.shadows += 1;
         }
     }
 }
 
 impl Wavefront<'_> {
     /// Finds the nearest hits of the first `count` rays.
-    pub(in crate::transport) fn trace<F: Features>(
+    pub(crate) fn trace<F: Features>(
         &mut self,
         context: &SceneContext<F>,
         count: usize,
@@ -204,7 +180,7 @@ impl Wavefront<'_> {
     }
 
     /// Shades the first `count` rays, already traced, and continues until no path is left.
-    pub(in crate::transport) fn follow<F: Features>(
+    pub(crate) fn follow<F: Features>(
         &mut self,
         context: &SceneContext<F>,
         mut count: usize,
@@ -230,12 +206,12 @@ impl Wavefront<'_> {
     ) -> usize {
         self.next = 0;
         let each = shade.shadow_rays().max(1);
-        let block = (self.shadow_rays.len() / each).clamp(1, BLOCK);
+        let block = (self.shadows.rays.len() / each).clamp(1, BLOCK);
         let mut start = 0;
         while start < count {
             let end = count.min(start + block);
             // One shadow ray per vertex always fits.
-            if self.shadows + each * (end - start) > self.shadow_rays.len() {
+            if self.shadows.count + each * (end - start) > self.shadows.rays.len() {
                 self.trace_shadow_rays(context, counters);
             }
             shade.shade(self, start..end, counters);
@@ -247,17 +223,14 @@ impl Wavefront<'_> {
 
     /// Traces the queue of shadow rays, and adds the light of unoccluded ones to their paths.
     fn trace_shadow_rays<F: Features>(&mut self, context: &SceneContext<F>, counters: &mut Counters) {
-        let count = core::mem::take(&mut self.shadows);
-        let Self { paths, shadow_rays: rays, shadow_light: light, shadow_hits: hits, hidden, .. } = self;
-        let arrive = |ray: &Ray, light: Rgb| {
-            let environment = context.scene.environment.as_ref().filter(|_| ray.tag & TO_ENVIRONMENT != 0);
+        let Self { paths, shadows, .. } = self;
+        shadows.trace(context, counters, |ray, light| {
+            let tag = ShadowTag(ray.tag);
+            let environment = context.scene.environment.as_ref().filter(|_| tag.is_flagged());
             let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(context.scene, ray.direction.into()));
-            if let Some(path) = paths.get_mut((ray.tag & !TO_ENVIRONMENT) as usize) {
+            if let Some(path) = paths.get_mut(tag.path()) {
                 path.add(light * radiance);
             }
-        };
-        let mut queue = ShadowRays { rays, light, hits, hidden };
-        counters.dropped.unfinished +=
-            context.trace_shadow_rays(&mut queue, count, &mut counters.shadow_rays, arrive);
+        });
     }
 }

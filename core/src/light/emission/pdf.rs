@@ -25,11 +25,13 @@ pub(crate) enum LightType {
 
 impl LightSampler<'_> {
     /// Index of the emitter that contains `triangle`.
+    #[cfg(feature = "reference")]
     pub(crate) fn emitter_index(&self, triangle: u32) -> Option<u32> {
         self.emitter_of(triangle).map(|(index, _)| index as u32)
     }
 
     /// Index of the environment in the order of emission, the last of all lights.
+    #[cfg(feature = "reference")]
     pub(crate) fn environment_index(&self) -> u32 {
         (self.finite_count() + self.distant.len()) as u32
     }

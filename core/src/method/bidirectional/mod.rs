@@ -17,10 +17,10 @@ use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat};
 use crate::light::EmissionSampler;
 use crate::memory::{Footprint, OutOfMemory};
+use crate::transport::bidirectional::Counts;
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::light_pass::{LightPass, TaskOutput, VERTICES_PER_TASK};
 use crate::transport::bidirectional::merge_photons::{MergeRadii, Merging};
-use crate::transport::bidirectional::mis::Counts;
 use crate::transport::bidirectional::vertex::LightVertex;
 use crate::transport::{Counters, RadiusSchedule};
 

@@ -13,8 +13,8 @@ use crate::method::pilot::PILOT_TILES;
 use crate::method::splats::splats_of_tile;
 use crate::method::{Executor, PhotonMapStore, RenderContext, caustics};
 use crate::scene::Scene;
+use crate::transport::bidirectional::Counts;
 use crate::transport::bidirectional::light_pass::{PATHS_PER_TASK, TaskOutput, VERTICES_PER_TASK};
-use crate::transport::bidirectional::mis::Counts;
 use crate::transport::bidirectional::vertex::LightVertex;
 use crate::transport::photon_mapping::deposit::PhotonFilter;
 

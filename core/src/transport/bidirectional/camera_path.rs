@@ -1,25 +1,20 @@
 //! A camera path in progress, the vertex that it has come to, and the shadow rays of its wave.
 
 use crate::Rgb;
-use crate::bsdf::Bsdf;
 use crate::geometry::Ray;
 use crate::sampling::Sampler;
-use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::contribution::{Class, Contribution};
-use crate::transport::bidirectional::mis::Sums;
-use crate::transport::bidirectional::shaded::Shaded;
 use crate::transport::walk::history::{History, Rest};
+use crate::transport::walk::shadow_tag::ShadowTag;
+use crate::transport::walk::subpath::{Subpath, Vertex};
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
 
 /// A camera path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct CameraPath {
-    pub(super) throughput: [f32; 3],
-    /// Density of the ray's direction per solid angle; infinite after a delta lobe and at the lens.
-    pub(super) pdf: f32,
+    pub(super) subpath: Subpath,
     pub(super) radiance: [f32; 3],
     /// The part of `radiance` by which merges are too bright for their width.
     pub(super) blur: [f32; 3],
@@ -27,21 +22,12 @@ pub(super) struct CameraPath {
     pub(super) place: u32,
     /// Index of the pixel in the picture.
     pub(super) pixel: u32,
-    /// The last vertex, and its normal for light sampling.
-    pub(super) position: [f32; 3],
-    pub(super) normal: [f32; 3],
-    /// Sums after the last scattering.
-    pub(super) sums: Sums,
-    pub(super) segments: u32,
     /// 1 behind the first rough vertex.
     pub(super) has_rough: u32,
     /// η: count of merges at the last vertex.
     pub(super) eta_vcm: f32,
     /// m: length from the lens to the last vertex.
     pub(super) travelled: f32,
-    pub(super) crossings: u32,
-    /// Triangle that the ray starts on.
-    pub(super) triangle: u32,
     /// Product of the squared relative indices of refraction.
     pub(super) eta_squared: f32,
     /// Random numbers of the lens, which the first vertex is projected with.
@@ -67,65 +53,33 @@ impl CameraPath {
     pub(super) fn has_rough(&self) -> bool {
         self.has_rough == 1
     }
-
-    /// Sums for a light at the end of the segment. No light path splats direct light.
-    pub(super) fn sums_of_hit(&self) -> Sums {
-        if self.segments == 2 { Sums::default() } else { self.sums }
-    }
 }
 
 /// A vertex that a path has arrived at.
-pub(super) struct Vertex<'v> {
-    pub(super) point: &'v SurfacePoint<'v>,
-    pub(super) bsdf: &'v Bsdf,
-    /// Direction to the vertex before, local.
-    pub(super) wo: Vec3,
-    /// Sums on arrival.
-    pub(super) sums: Sums,
+pub(super) struct CameraVertex<'v> {
+    pub(super) vertex: Vertex<'v>,
     /// No rough vertex lies before it.
     pub(super) is_first_rough: bool,
     /// η: count of merges here, 0 where there is none.
     pub(super) eta_vcm: f32,
-    /// The shading normal depends on the camera path: no light path can come here.
-    pub(super) is_bent: bool,
     pub(super) sampler: Sampler,
-    /// Its light sample and next ray, where they have been computed in lanes.
-    pub(super) shaded: Option<Shaded<'v>>,
 }
 
-/// The bit of a shadow ray's tag that says that it belongs to a connection.
-const CONNECTION: u32 = 1 << 31;
-
-/// Least bit of the [`Rest`] in the tag.
-const REST: u32 = 27;
-
-/// Shadow rays of a wave, whose tag is the index of their path.
+/// Shadow rays of a wave.
 pub(super) struct Queue<'w> {
     pub(super) shadows: ShadowRays<'w>,
-    pub(super) count: usize,
     /// For the pilot of counts.
     pub(super) recorder: Option<Recorder<'w>>,
 }
 
 impl Queue<'_> {
     pub(super) fn push(&mut self, (class, rest): (Class, Rest), path: u32, ray: Ray, light: Rgb) {
-        let slots = (self.shadows.rays.get_mut(self.count), self.shadows.light.get_mut(self.count));
-        if let (Some(slot), Some(arrives)) = slots {
-            let connection = if class == Class::Connections { CONNECTION } else { 0 };
-            let tag = path | connection | rest.bits() << REST;
-            if let Some(recorder) = &mut self.recorder {
-                recorder.connections += u64::from(class == Class::Connections);
-            }
-            (*slot, *arrives) = (Ray { tag, ..ray }, light.to_array());
-            self.count += 1;
+        let is_connection = class == Class::Connections;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.connections += u64::from(is_connection);
         }
-    }
-
-    /// The path of a shadow ray by its `tag`, its class and the rest that its light belongs to.
-    pub(super) fn of_tag(tag: u32) -> (usize, (Class, Rest)) {
-        let class = if tag & CONNECTION == 0 { Class::Paths } else { Class::Connections };
-        let rest = Rest::from_bits(tag >> REST);
-        ((tag & ((1 << REST) - 1)) as usize, (class, rest))
+        let ShadowTag(tag) = ShadowTag::of_technique(path, is_connection, rest);
+        self.shadows.push(Ray { tag, ..ray }, light);
     }
 
     /// Records what `path` has got since it had `before`.

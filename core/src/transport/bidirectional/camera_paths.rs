@@ -3,33 +3,28 @@
 //! so that the tracer sees batches of rays.
 
 use crate::Rgb;
-use crate::bsdf::{Bsdf, Features};
+use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
-use crate::geometry::{Hit, MISS, Ray};
+use crate::geometry::{Hit, Ray};
 use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
-use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::arrival::Arrival;
-use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Recorder, Vertex};
+use crate::transport::bidirectional::camera_path::{CameraPath, CameraVertex, Queue, Recorder};
 use crate::transport::bidirectional::contribution::{Class, Contribution};
-use crate::transport::bidirectional::ends::{End, sums_from_camera};
 use crate::transport::bidirectional::merge_photons::Merging;
-use crate::transport::bidirectional::mis::{Counts, Sums};
-use crate::transport::bidirectional::shaded::Shaded;
-use crate::transport::bidirectional::vertex::{LightVertex, is_bent};
+use crate::transport::bidirectional::vertex::LightVertex;
 use crate::transport::settings::{Counters, PathSettings};
-use crate::transport::walk::block::Block;
-use crate::transport::walk::block_scatter::Sets;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
-use crate::transport::walk::points::Met;
-use crate::transport::walk::termination::MAX_CROSSINGS;
+use crate::transport::walk::shading::{ShadedHit, Shading, VertexNumbers};
+use crate::transport::walk::shadow_tag::ShadowTag;
+use crate::transport::walk::subpath::{Next, Walk};
+use crate::transport::walk::sums::{Arrival, Counts};
+use crate::transport::walk::vertex::Scatterer;
 use crate::transport::walk::visibility::ShadowRays;
-use crate::transport::wavefront::BLOCK;
 use core::ops::Range;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// The light vertices of a sample of the picture.
 #[derive(Clone, Copy)]
@@ -43,10 +38,8 @@ pub struct Connections<'a> {
 /// Traces camera paths.
 #[derive(Clone, Copy)]
 pub struct CameraPaths<'a, F> {
-    pub(super) context: SceneContext<'a, F>,
-    pub(super) emission: &'a EmissionSampler<'a>,
+    pub(super) walk: Walk<'a, F>,
     pub(super) settings: PathSettings,
-    pub(super) counts: Counts,
     pub(super) connections: Connections<'a>,
     pub(super) merging: Option<Merging<'a>>,
 }
@@ -61,16 +54,6 @@ pub struct Recorded {
     pub counters: Counters,
 }
 
-/// The paths of a tile that advance together.
-struct Wave<'w> {
-    paths: &'w mut [CameraPath],
-    rays: &'w mut [Ray],
-    hits: &'w mut [Hit],
-    /// The light vertices that each is connected to: where they are stored, and as they are.
-    indices: &'w mut [u32],
-    drawn: &'w mut [LightVertex],
-}
-
 impl<'a, F: Features> CameraPaths<'a, F> {
     /// Camera paths with the techniques of `counts`, connected to `connections`.
     pub fn new(
@@ -80,7 +63,8 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         counts: Counts,
         connections: Connections<'a>,
     ) -> Self {
-        Self { context, emission, settings, counts, connections, merging: None }
+        let walk = Walk { context, emission, size: [settings.width, settings.height], counts };
+        Self { walk, settings, connections, merging: None }
     }
 
     /// Camera paths that are merged with photons as well.
@@ -103,10 +87,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             .slice::<Hit>(PIXELS_PER_TILE)
             .slice::<u32>(PIXELS_PER_TILE * connections as usize)
             .slice::<LightVertex>(PIXELS_PER_TILE * connections as usize)
-            .slice::<Ray>(shadows)
-            .slice::<[f32; 3]>(shadows)
-            .slice::<Hit>(shadows)
-            .slice::<u8>(shadows)
+            .and(ShadowRays::footprint(shadows))
     }
 
     /// Adds `samples` of tile `tile` to its pixels `out`, each with the light of `splats`, those of the
@@ -170,29 +151,14 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let indices: &mut [u32] = arena.slice(PIXELS_PER_TILE * self.connections.count as usize)?;
         let drawn: &mut [LightVertex] = arena.slice(PIXELS_PER_TILE * self.connections.count as usize)?;
         let shadows = PIXELS_PER_TILE * (1 + self.connections.count as usize);
-        let mut queue = Queue {
-            shadows: ShadowRays {
-                rays: arena.slice(shadows)?,
-                light: arena.slice(shadows)?,
-                hits: arena.slice(shadows)?,
-                hidden: arena.slice(shadows)?,
-            },
-            count: 0,
-            recorder,
-        };
+        let mut queue = Queue { shadows: ShadowRays::new(shadows, &mut arena)?, recorder };
         let tile = Tile::new(self.settings.width, self.settings.height, tile);
         let mut counters = Counters::default();
         for sample in samples {
             let count = self.start(&tile, sample, paths, rays);
             counters.paths += count as u64;
-            let wave = Wave {
-                paths: &mut *paths,
-                rays: &mut *rays,
-                hits: &mut *hits,
-                indices: &mut *indices,
-                drawn: &mut *drawn,
-            };
-            self.trace(sample, wave, count, &mut queue, &mut counters);
+            let drawn = (&mut *indices, &mut *drawn);
+            self.trace(sample, (&mut paths[..count], rays, hits), drawn, &mut queue, &mut counters);
             done(sample, &paths[..count], &mut counters);
         }
         Ok((queue.recorder, counters))
@@ -200,7 +166,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
 
     /// Fills `paths` and `rays` with those of the camera; returns how many.
     fn start(&self, tile: &Tile, sample: u32, paths: &mut [CameraPath], rays: &mut [Ray]) -> usize {
-        let PathSettings { width, height, seed, .. } = self.settings;
+        let PathSettings { width, seed, .. } = self.settings;
         let mut count = 0;
         for place in 0..PIXELS_PER_TILE {
             let Some((x, y)) = tile.pixel(place) else { continue };
@@ -208,15 +174,13 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             let sampler = Sampler::new(seed, pixel, sample);
             let [dx, dy] = sampler.pair(dimension::PIXEL);
             let lens = sampler.pair(dimension::LENS);
-            let ray = self.context.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+            let raster = Vec2::new(x as f32 + dx, y as f32 + dy);
+            let (subpath, ray) = self.walk.start_at_camera(raster, lens);
             rays[count] = Ray { tag: count as u32, ..ray };
             paths[count] = CameraPath {
-                throughput: [1.0; 3],
-                pdf: f32::INFINITY,
+                subpath,
                 place: place as u32,
                 pixel,
-                segments: 1,
-                triangle: MISS,
                 eta_squared: 1.0,
                 lens,
                 ..CameraPath::default()
@@ -226,26 +190,23 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         count
     }
 
-    /// Advances the first `count` paths until none is left.
+    /// Advances `paths` until none is left. Light vertices that they are connected to are drawn by `indices`.
     fn trace(
         &self,
         sample: u32,
-        Wave { paths, rays, hits, indices, drawn }: Wave,
-        count: usize,
+        (paths, rays, hits): (&mut [CameraPath], &mut [Ray], &mut [Hit]),
+        (indices, drawn): (&mut [u32], &mut [LightVertex]),
         queue: &mut Queue,
         counters: &mut Counters,
     ) {
-        let mut active = count;
+        let mut active = paths.len();
         let mut coherence = Coherence::Coherent;
-        let mut block = Block::new();
-        let has_lanes = self.context.has_lanes();
+        let mut shading = Shading::new();
+        let (context, PathSettings { seed, max_depth, .. }) = (&self.walk.context, self.settings);
+        let sampler_of = |path: &CameraPath| Sampler::new(seed, path.pixel, sample);
+        let vertices = self.connections.vertices;
+        let each = if vertices.is_empty() { 0 } else { self.connections.count as usize };
         while active > 0 {
-            counters.rays += active as u64;
-            self.context.nearest_batch(&rays[..active], coherence, &mut hits[..active]);
-            coherence = Coherence::Incoherent;
-            let sampler_of = |path: &CameraPath| Sampler::new(self.settings.seed, path.pixel, sample);
-            let vertices = self.connections.vertices;
-            let each = if vertices.is_empty() { 0 } else { self.connections.count as usize };
             for (i, ray) in rays[..active].iter().enumerate() {
                 let indices = indices.get_mut(i * each..(i + 1) * each).unwrap_or_default();
                 if let Some(path) = paths.get(ray.tag as usize) {
@@ -256,129 +217,144 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             for (index, drawn) in indices[..active * each].iter().zip(&mut *drawn) {
                 *drawn = vertices.get(*index as usize).copied().unwrap_or_default();
             }
-            let (mut left, mut sets) = (0, Sets::default());
-            queue.count = 0;
-            for i in 0..active {
-                if i.is_multiple_of(BLOCK) {
-                    let of_block = i..active.min(i + BLOCK);
-                    let traced = (&rays[of_block.clone()], &hits[of_block]);
-                    block.points.meet(&self.context, traced);
-                    if has_lanes {
-                        sets = self.shade(&mut block, (paths, sample), traced.0);
-                    }
-                }
-                let met = block.points.at(i % BLOCK);
-                let shaded = has_lanes.then_some(Shaded { block: &block, sets: &sets, i: i % BLOCK });
-                let (ray, hit) = (rays[i], hits[i]);
-                let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
-                let sampler = sampler_of(path);
+            let numbers = |paths: &[CameraPath], tag: u32| {
+                let CameraPath { subpath, pixel, eta_squared, .. } = paths.get(tag as usize)?;
+                let place = Sampler::place(seed, *pixel, sample);
+                let numbers = VertexNumbers::Path(place, subpath.throughput, *eta_squared);
+                (subpath.segments < max_depth).then_some((subpath.segments, numbers))
+            };
+            let traced = (&mut rays[..active], &mut hits[..active], coherence);
+            active = shading.advance(context, traced, counters, paths, numbers, |paths, i, end, counters| {
+                let path = paths.get_mut(end.0.tag as usize)?;
                 let drawn = drawn.get(i * each..(i + 1) * each).unwrap_or_default();
-                if let Some(next) =
-                    self.step(path, (sampler, drawn), (&ray, &hit, met, shaded), queue, counters)
-                {
-                    rays[left] = Ray { tag: ray.tag, ..next };
-                    left += 1;
-                }
-            }
-            active = left;
-            let Queue { shadows, count, recorder } = queue;
-            let arrive = |ray: &Ray, light: Rgb| {
-                let (path, class) = Queue::of_tag(ray.tag);
-                let Some(path) = paths.get_mut(path) else { return };
+                self.step(path, (sampler_of(path), drawn), end, queue, counters)
+            });
+            coherence = Coherence::Incoherent;
+            let Queue { shadows, recorder } = queue;
+            shadows.trace(context, counters, |ray, light| {
+                let tag = ShadowTag(ray.tag);
+                let Some(path) = paths.get_mut(tag.path()) else { return };
                 path.add(light);
                 if let Some(recorder) = recorder {
-                    recorder.push(class, path.place, light);
+                    let class = if tag.is_flagged() { Class::Connections } else { Class::Paths };
+                    recorder.push((class, tag.rest()), path.place, light);
                 }
-            };
-            let rays = &mut counters.shadow_rays;
-            counters.dropped.unfinished += self.context.trace_shadow_rays(shadows, *count, rays, arrive);
+            });
         }
     }
 
     /// One vertex of a path. The ray by which the path goes on.
+    #[inline]
     fn step(
         &self,
         path: &mut CameraPath,
         (sampler, drawn): (Sampler, &[LightVertex]),
-        (ray, hit, met, shaded): (&Ray, &Hit, Met, Option<Shaded>),
+        (ray, hit, shaded): (&Ray, &Hit, ShadedHit),
         queue: &mut Queue,
         counters: &mut Counters,
     ) -> Option<Ray> {
+        let Self { walk, .. } = self;
         let direction = Vec3::from(ray.direction);
         let before = path.radiance;
         if !hit.is_some() {
-            self.escape(path, direction);
+            let light = walk.escape(&path.subpath, direction);
+            path.add(light.map_or(Rgb::ZERO, |light| light.radiance));
             queue.record(Class::Paths, path.history.rest_of_hit(), path, before);
             return None;
         }
-        let point = met.point()?;
-        let opacity = || sampler.single(dimension::opacity(path.segments, path.crossings));
-        let is_skipped = self.context.is_skipped(&point, hit, path.triangle, opacity)
-            || path.segments == 1 && point.is_left_by(ray);
-        if is_skipped {
-            if path.crossings >= MAX_CROSSINGS {
-                counters.dropped.unfinished += 1;
-                return None;
-            }
-            path.crossings += 1;
-            path.triangle = hit.triangle;
-            return Some(point.spawn(direction));
+        let point = shaded.met.point()?;
+        let opacity = |surfaces| sampler.single(dimension::CROSSING + surfaces);
+        let met = (ray, hit, &point);
+        if let Err(behind) = walk.stop(&mut path.subpath, met, true, opacity, counters) {
+            return behind;
         }
-        self.emission(path, &point, hit, direction);
+        if let Some(light) = walk.emission(&path.subpath, &point, direction) {
+            path.add(light.radiance);
+        }
         queue.record(Class::Paths, path.history.rest_of_hit(), path, before);
         path.travelled += hit.t;
-        if path.segments >= self.settings.max_depth {
+        let segments = path.subpath.segments;
+        if segments >= self.settings.max_depth {
             return None;
         }
-        let own;
-        let bsdf = match &shaded {
-            Some(shaded) => shaded.bsdf(),
-            None => {
-                own = met.bsdf::<F>(self.context.scene);
-                &own
-            }
-        };
-        path.history = path.history.on_camera_path(bsdf);
-        let wo = point.frame.to_local(-direction);
-        let is_bent = is_bent(&point, wo);
-        let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, bsdf, direction) };
-        let is_first_rough = path.has_rough == 0 && !bsdf.is_caustic_caster();
-        let eta_vcm = match &self.merging {
-            Some(merging) if is_first_rough && !is_bent => merging.radii.eta_vcm(bsdf, point.position),
-            _ => 0.0,
-        };
-        let vertex =
-            Vertex { point: &point, bsdf, wo, sums, is_first_rough, eta_vcm, is_bent, sampler, shaded };
+        let bsdf = shaded.bsdf::<F>(walk.context.scene);
+        path.history = path.history.on_camera_path(&bsdf);
+        let at = self.arrive(path, Scatterer { point: &point, bsdf: &bsdf }, direction, sampler);
+        let vertex = &at.vertex;
         let before = path.radiance;
-        self.merge(path, &vertex);
+        self.merge(path, &at);
         queue.record(Class::Merges, path.history.rest_of_merge(), path, before);
         if !bsdf.is_delta() {
-            self.light_sample(path, &vertex, ray.tag, queue);
-            if !is_bent {
-                self.connect(path, &vertex, drawn, ray.tag, queue);
+            let sample = || walk.sample_light(vertex, dimension::light_sample(&sampler, segments));
+            if let Some(lit) = shaded.lit(&walk.context, sample) {
+                let light = walk.light_sample(&path.subpath, vertex, &lit);
+                let class = (Class::Paths, path.history.rest_of_sample());
+                queue.push(class, ray.tag, lit.ray, light.radiance);
+            }
+            if !vertex.is_bent {
+                self.connect(path, &at, drawn, ray.tag, queue);
             }
         }
-        self.scatter(path, &vertex, hit, direction, counters)
+        let next = shaded.next(|| {
+            let sample = bsdf.sample::<F>(vertex.wo, dimension::bsdf_sample(&sampler, segments))?;
+            let roulette = || sampler.single(dimension::vertex(segments) + dimension::ROULETTE);
+            let next = walk.next((&path.subpath, path.eta_squared), vertex, sample, roulette)?;
+            Some(next.0)
+        })?;
+        self.scatter(path, &at, &next, counters)
     }
 
-    /// The squared distance within which a rough vertex is near one whose merges count η.
-    pub(super) fn near(&self, eta_vcm: f32) -> f32 {
-        self.merging.as_ref().map_or(0.0, |merging| merging.radii.near(eta_vcm))
-    }
-
-    /// Sums where the path arrives at `point`.
-    fn arrive(&self, path: &CameraPath, point: &SurfacePoint, bsdf: &Bsdf, direction: Vec3) -> Sums {
-        let cos = direction.dot(point.geometric_normal).abs();
-        let is_delta = bsdf.is_delta();
-        if path.segments > 1 {
-            let squared = point.position.distance_squared(path.position.into());
-            let sums = path.sums.arrive(squared, cos, is_delta);
-            let arrival = Arrival::of(bsdf.is_caustic_caster(), squared, self.near(path.eta_vcm));
-            // The segment is that behind the vertex of the merge.
-            let is_merged = arrival.is_some_and(|arrival| arrival.is_merged(path.segments - 1));
-            return if is_merged { sums.with_merge() } else { sums };
+    /// The vertex where the path arrives.
+    #[inline]
+    fn arrive<'v>(
+        &self,
+        path: &CameraPath,
+        at: Scatterer<'v>,
+        direction: Vec3,
+        sampler: Sampler,
+    ) -> CameraVertex<'v> {
+        let is_caster = at.bsdf.is_caustic_caster();
+        let (subpath, is_first_rough) = (&path.subpath, path.has_rough == 0 && !is_caster);
+        let mut vertex = self.walk.camera_vertex(subpath, at, direction, path.lens);
+        let mut eta_vcm = 0.0;
+        if let Some(Merging { radii, .. }) = self.merging.as_ref().filter(|_| !vertex.is_bent) {
+            if is_first_rough {
+                eta_vcm = radii.eta_vcm(at.bsdf, at.point.position);
+            }
+            if subpath.segments > 1 {
+                let squared = at.point.position.distance_squared(subpath.position.into());
+                let arrival = Arrival::of(is_caster, squared, radii.near(path.eta_vcm));
+                // The segment is that behind the vertex of the merge.
+                if arrival.is_some_and(|arrival| arrival.is_merged(subpath.segments - 1)) {
+                    vertex.sums = vertex.sums.with_merge();
+                }
+            }
         }
-        let PathSettings { width, height, .. } = self.settings;
-        sums_from_camera(&self.context, &self.counts, [width, height], path.lens, End { point, bsdf, cos })
+        CameraVertex { vertex, is_first_rough, eta_vcm, sampler }
+    }
+
+    /// The path goes on to `next`. Its ray.
+    #[inline]
+    fn scatter(
+        &self,
+        path: &mut CameraPath,
+        CameraVertex { vertex, eta_vcm, .. }: &CameraVertex,
+        next: &Next,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        let (mut vertex, is_delta) = (*vertex, next.sample.delta);
+        if is_delta {
+            // The next vertex is behind a caster.
+            vertex.sums = vertex.sums.with_merge();
+        }
+        let is_rough = !vertex.at.bsdf.is_caustic_caster();
+        let at = (&mut path.subpath, &mut path.eta_squared);
+        let ray = self.walk.go_on(at, &vertex, next, is_rough.then_some(*eta_vcm), counters)?;
+        path.eta_vcm = if is_delta { 0.0 } else { *eta_vcm };
+        path.has_rough |= u32::from(is_rough && !is_delta);
+        if is_delta {
+            path.history = path.history.by_coat();
+        }
+        Some(ray)
     }
 }

@@ -10,20 +10,24 @@
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::photon::{Kernel, KernelBoundary, QueryDisc};
-use crate::transport::bidirectional::camera_path::{CameraPath, Vertex};
+use crate::transport::bidirectional::camera_path::{CameraPath, CameraVertex};
 use crate::transport::bidirectional::camera_paths::CameraPaths;
 use crate::transport::bidirectional::merge_photons::Merging;
-use crate::transport::bidirectional::mis::weight_of_merge;
-use crate::transport::bidirectional::vertex::{LightVertex, scattering};
+use crate::transport::bidirectional::vertex::LightVertex;
 use crate::transport::photon_mapping::density::{GRAZING, kernel_boundary};
 use crate::transport::walk::dimension;
+use crate::transport::walk::subpath::Vertex;
+use crate::transport::walk::sums::weight_of_merge;
+use crate::transport::walk::vertex::Scatterer;
 use glam::Vec3;
 
 impl<F: Features> CameraPaths<'_, F> {
     /// Light of the photons around `vertex`.
-    pub(super) fn merge(&self, path: &mut CameraPath, vertex: &Vertex) {
+    #[inline]
+    pub(super) fn merge(&self, path: &mut CameraPath, vertex: &CameraVertex) {
         let Some(Merging { photons, radii, .. }) = &self.merging else { return };
-        let Vertex { point, eta_vcm, ref sampler, .. } = *vertex;
+        let CameraVertex { vertex: Vertex { at: Scatterer { point, .. }, .. }, eta_vcm, ref sampler, .. } =
+            *vertex;
         if eta_vcm == 0.0 || photons.is_empty() {
             return;
         }
@@ -39,14 +43,15 @@ impl<F: Features> CameraPaths<'_, F> {
             return;
         }
         let origin = point.position + point.error * point.geometric_normal;
-        let turns = sampler.single(dimension::PROBES + path.segments);
-        let boundary = kernel_boundary(&self.context.bvh, self.context.level, (origin, true), &disc, turns);
+        let turns = sampler.single(dimension::PROBES + path.subpath.segments);
+        let boundary =
+            kernel_boundary(&self.walk.context.bvh, self.walk.context.level, (origin, true), &disc, turns);
         if !boundary.is_open() {
             density = self.density(path, vertex, (&disc, Some(&boundary)));
         }
         // Both paths have met the cut-out, which the light passes but once.
-        let opacity = self.context.opacity_at(point);
-        let [light, finer] = density.map(|light| Rgb::from(path.throughput) * light / opacity);
+        let opacity = self.walk.context.opacity_at(point);
+        let [light, finer] = density.map(|light| Rgb::from(path.subpath.throughput) * light / opacity);
         path.add(light);
         path.add_blur((light - finer) * (4.0 / 3.0));
     }
@@ -55,12 +60,12 @@ impl<F: Features> CameraPaths<'_, F> {
     fn density(
         &self,
         path: &CameraPath,
-        vertex: &Vertex,
+        vertex: &CameraVertex,
         (disc, boundary): (&QueryDisc, Option<&KernelBoundary>),
     ) -> [Rgb; 2] {
         let mut sums = [Rgb::ZERO; 2];
         let Some(Merging { photons, vertices, .. }) = &self.merging else { return sums };
-        photons.tagged_within(self.context.level, disc, boundary, |tag, weights| {
+        photons.tagged_within(self.walk.context.level, disc, boundary, |tag, weights| {
             let light =
                 vertices.get(tag as usize).map_or(Rgb::ZERO, |light| self.merged(path, vertex, light));
             sums = [sums[0] + light * weights[0], sums[1] + light * weights[1]];
@@ -69,18 +74,20 @@ impl<F: Features> CameraPaths<'_, F> {
     }
 
     /// The light of one photon that leaves `vertex`, weighted: times m².
-    fn merged(&self, path: &CameraPath, vertex: &Vertex, light: &LightVertex) -> Rgb {
-        let is_merged = light.arrival().is_some_and(|arrival| arrival.is_merged(path.segments));
-        if !is_merged || path.segments + u32::from(light.segments) > self.settings.max_depth {
+    fn merged(&self, path: &CameraPath, vertex: &CameraVertex, light: &LightVertex) -> Rgb {
+        let segments = path.subpath.segments;
+        let is_merged = light.arrival().is_some_and(|arrival| arrival.is_merged(segments));
+        if !is_merged || segments + u32::from(light.segments) > self.settings.max_depth {
             return Rgb::ZERO;
         }
-        let Vertex { point, bsdf, wo, ref sums, eta_vcm, .. } = *vertex;
+        let CameraVertex { vertex: Vertex { at: here, wo, ref sums, .. }, eta_vcm, .. } = *vertex;
+        let point = here.point;
         let to_light = Vec3::from(light.to_light);
         let wi = point.frame.to_local(to_light);
         if !point.sides_agree(wi, to_light) {
             return Rgb::ZERO;
         }
-        let at = scattering(&self.context, (point, bsdf), wo, wi);
+        let at = here.scattering(&self.walk.context, wo, wi);
         let weight = weight_of_merge(eta_vcm, (sums, at.pdf_to_camera), (&light.sums, at.pdf_to_light));
         // The cosine of the geometric normal is in the density of photons.
         Rgb::from(light.power) * at.value * (weight / to_light.dot(point.geometric_normal).abs().max(GRAZING))

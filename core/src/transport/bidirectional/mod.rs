@@ -9,24 +9,21 @@
 //!    scatters.
 //!
 //! The loop over samples is `Method::round` in `method/bidirectional`. Both walks carry the running sums of
-//! [`mis`], which weight all techniques by [`mis::Counts`]: without light paths the camera paths are path
+//! `walk/sums.rs`, which weight all techniques by [`Counts`]: without light paths the camera paths are path
 //! tracing, without connections both together are light tracing.
 //!
 //! A vertex is a *caster* if its surface reflects or transmits in a narrow lobe
 //! ([`Bsdf::is_caustic_caster`](crate::bsdf::Bsdf::is_caustic_caster)), and *rough* otherwise.
 
-mod arrival;
 mod camera_path;
 pub mod camera_paths;
+mod connection;
 pub mod contribution;
-pub(in crate::transport) mod ends;
-mod lanes;
 pub mod light_pass;
 pub mod merge_photons;
 mod merging;
-pub mod mis;
+#[cfg(feature = "reference")]
 pub mod reference;
-mod scattering;
-pub(in crate::transport) mod shaded;
-mod techniques;
 pub mod vertex;
+
+pub use crate::transport::walk::sums::Counts;

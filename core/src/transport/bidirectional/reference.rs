@@ -1,6 +1,6 @@
 //! The bidirectional estimator of the textbook (Veach 1997, chapter 10): one path at a time, whose weights
 //! come from the densities of all techniques, written down for the whole path in f64. It is what the running
-//! sums of [`super::mis`] are tested against.
+//! sums of `walk/sums.rs` are tested against.
 //!
 //! The densities are a function of the path alone, whichever technique has found it. So weights that agree
 //! with them add up to one.
@@ -10,18 +10,15 @@ use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{EmissionSampler, LightType, emitted};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::arrival::Arrival;
-use crate::transport::bidirectional::light_pass::lens_point;
 use crate::transport::bidirectional::merge_photons::MergeRadii;
-use crate::transport::bidirectional::mis::Counts;
-use crate::transport::bidirectional::vertex::{
-    is_bent, normal_for_lights, scattering, scattering_from_light,
-};
-use crate::transport::settings::PathSettings;
-use crate::transport::walk::context::SceneContext;
+use crate::transport::settings::{Counters, PathSettings};
+use crate::transport::walk::context::{Origin, SceneContext};
 use crate::transport::walk::dimension;
 use crate::transport::walk::light::{LightWalk, PATHS_PER_TASK};
-use crate::transport::walk::termination::{MAX_CROSSINGS, continuation_probability};
+use crate::transport::walk::sums::{Arrival, Counts};
+use crate::transport::walk::techniques::lens_point;
+use crate::transport::walk::termination::survive;
+use crate::transport::walk::vertex::{Scatterer, is_bent_at};
 use crate::{Level, Rgb};
 use glam::Vec3;
 
@@ -99,7 +96,8 @@ impl<'a> Reference<'a> {
         if !point.sides_agree(wo, to_camera) {
             return None;
         }
-        let value = scattering_from_light(&context, (&point, &bsdf), wo, wi).value;
+        let at = Scatterer { point: &point, bsdf: &bsdf };
+        let value = at.scattering_from_light(&context, wo, wi).value;
         let path = Path::joined(light.light, vertices, &[], lens)?;
         let weight = self.weight(&path, count + 1);
         let cos = |direction: Vec3| direction.dot(point.geometric_normal).abs();
@@ -129,7 +127,7 @@ impl<'a> Reference<'a> {
         let (mut radiance, mut throughput, mut eta_squared) = (Rgb::ZERO, Rgb::ONE, 1.0);
         // The vertices so far, from the lens on.
         let mut vertices = [PathVertex::default(); MOST_SEGMENTS];
-        let (mut triangle, mut segments, mut crossings) = (MISS, 1, 0);
+        let (mut origin, mut segments) = (Origin { triangle: MISS, crossings: 0 }, 1);
         loop {
             let direction = Vec3::from(ray.direction);
             let hit = context.nearest(&ray);
@@ -144,14 +142,15 @@ impl<'a> Reference<'a> {
                 break;
             }
             let Some(point) = context.surface_at(&ray, &hit) else { break };
-            let opacity = || sampler.single(dimension::opacity(segments, crossings));
-            if context.is_skipped(&point, &hit, triangle, opacity) || segments == 1 && point.is_left_by(&ray)
-            {
-                if crossings >= MAX_CROSSINGS {
-                    break;
+            let opacity = |crossings| sampler.single(dimension::opacity(segments, crossings));
+            let met = (&ray, &hit, &point);
+            match context.stop(&mut origin, met, segments == 1, opacity, &mut Counters::default()) {
+                Ok(()) => {}
+                Err(None) => break,
+                Err(Some(behind)) => {
+                    ray = behind;
+                    continue;
                 }
-                (crossings, triangle, ray) = (crossings + 1, hit.triangle, point.spawn(direction));
-                continue;
             }
             let seen = emitted(context.scene, hit.triangle, point.uv, point.front);
             if seen != Rgb::ZERO {
@@ -162,7 +161,7 @@ impl<'a> Reference<'a> {
                 break;
             }
             let (bsdf, wo) = (context.bsdf_at(&point), point.frame.to_local(-direction));
-            if is_bent(&point, wo) {
+            if is_bent_at(&point, -direction) {
                 return None;
             }
             vertices[segments as usize - 1] = PathVertex::at(&point, &hit);
@@ -173,23 +172,16 @@ impl<'a> Reference<'a> {
                 radiance += self.connections(&here, &sampler, before, paths, (stored, connections));
             }
 
-            let [u, v] = dimension::scattering(&sampler, segments);
-            let first = dimension::vertex(segments);
-            let lobe = sampler.single(first + dimension::LOBE);
-            let Some(sample) = bsdf.sample::<All>(wo, [u, v, lobe]) else { break };
-            let towards = point.frame.to_world(sample.direction);
-            if !point.sides_agree(sample.direction, towards) {
-                break;
-            }
+            let at = Scatterer { point: &point, bsdf: &bsdf };
+            let u = dimension::bsdf_sample(&sampler, segments);
+            let Some((sample, towards)) = at.sample::<All>(direction, u) else { break };
             throughput *= sample.weight;
             eta_squared *= sample.eta * sample.eta;
-            let survival = continuation_probability(segments, throughput * eta_squared);
-            if sampler.single(first + dimension::ROULETTE) >= survival {
-                break;
-            }
+            let roulette = || sampler.single(dimension::vertex(segments) + dimension::ROULETTE);
+            let Some(survival) = survive(segments, throughput * eta_squared, roulette) else { break };
             throughput /= survival;
             vertices[segments as usize - 1].leave(&sample, 1.0 / sample.eta);
-            (ray, triangle, segments) = (point.spawn(towards), hit.triangle, segments + 1);
+            (ray, origin.triangle, segments) = (point.spawn(towards), hit.triangle, segments + 1);
         }
         Some(radiance)
     }
@@ -197,11 +189,9 @@ impl<'a> Reference<'a> {
     fn light_sample(&self, here: &Here, sampler: &Sampler, vertices: &[PathVertex]) -> Rgb {
         let Self { context, .. } = self;
         let Here { point, bsdf, wo, throughput, lens } = *here;
-        let first = dimension::vertex(vertices.len() as u32);
-        let ([u, v], choice) =
-            (sampler.pair(first + dimension::LIGHT), sampler.single(first + dimension::LIGHT_CHOICE));
-        let normal = normal_for_lights(point, bsdf);
-        let Some(light) = context.lights.sample(context.scene, point.position, normal, [u, v, choice]) else {
+        let u = dimension::light_sample(sampler, vertices.len() as u32);
+        let normal = Scatterer { point, bsdf }.normal_for_lights();
+        let Some(light) = context.lights.sample(context.scene, point.position, normal, u) else {
             return Rgb::ZERO;
         };
         let wi = point.frame.to_local(light.direction);
@@ -259,9 +249,9 @@ impl<'a> Reference<'a> {
         if !(point.sides_agree(wi, to_light) && other.sides_agree(out, -to_light)) {
             return None;
         }
-        let at_camera = scattering(context, (point, bsdf), wo, wi).value;
-        let at_light =
-            scattering_from_light(context, (&other, &other_bsdf), out, other.frame.to_local(back)).value;
+        let at_camera = Scatterer { point, bsdf }.scattering(context, wo, wi).value;
+        let at = Scatterer { point: &other, bsdf: &other_bsdf };
+        let at_light = at.scattering_from_light(context, out, other.frame.to_local(back)).value;
         let path = Path::joined(light.light, &light.vertices[..count], vertices, lens)?;
         let weight = self.weight(&path, count + 1);
         let cos = |direction: Vec3| direction.dot(other.geometric_normal).abs();

@@ -13,11 +13,12 @@ use crate::transport::path::estimator::{KnownLight, LightEstimator, PathVertex, 
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::path_classes::PathClasses;
-use crate::transport::wavefront::{BLOCK, Wavefront};
+use crate::transport::wavefront::Wavefront;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use core::ops::Range;
 use glam::Vec3;
+use halflight_simd::kernels::shade::BLOCK;
 
 const _: () = assert!(BLOCK == POINTS, "a block of vertices is looked up at once");
 

@@ -14,8 +14,8 @@ use crate::transport::cached::gather::GatherPoint;
 use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
-use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::BLOCK;
 
 /// Maximum distance to records, in diagonals of the scene.
 const MAX_DISTANCE: f32 = 0.25;

@@ -12,6 +12,7 @@ use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::Segment;
 use crate::transport::walk::dimension;
+use crate::transport::walk::vertex::Scatterer;
 use core::f32::consts::PI;
 use glam::Vec3;
 
@@ -180,10 +181,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
                 seen = Via::Glossy;
                 spread = spread.max(1.0 / (PER_LOBE * libm::sqrtf(PI * sample.pdf)));
             }
-            let next = point.frame.to_world(sample.direction);
-            if !point.sides_agree(sample.direction, next) {
-                return None;
-            }
+            let next = Scatterer { point: &point, bsdf: &bsdf }.towards(&sample)?;
             segment = segment.onward(&point, &met, next);
             counters.rays += 1;
             hit = self.context.nearest(&segment.ray);

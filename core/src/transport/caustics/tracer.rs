@@ -23,6 +23,7 @@ pub use crate::transport::walk::light::PATHS_PER_TASK;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
 use crate::transport::walk::mis::{ChainLink, merging_weight};
 use crate::transport::walk::photon_buffer::PhotonBuffer;
+use crate::transport::walk::vertex::Scatterer;
 use crate::{Level, Rgb};
 use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
@@ -226,38 +227,12 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     /// `chain_ratio` and `path_pdfs` before the first surface. `back` is the pdf of the direction to the
     /// light; `None` after a specular scattering.
     fn first(&self, state: &LightPathState, vertex: &Vertex, back: Option<f32>) -> (f32, f32) {
-        let LightWalk { context: SceneContext { scene, ref lights, .. }, emission, .. } = self.walk;
-        let &Vertex { point, bsdf, to_light, .. } = vertex;
-        let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
-        let position = point.position;
-        let with = |chosen: f32| back.map_or(0.0, |back| chosen / back);
-        let by_chance = |chosen: f32| libm::sqrtf(1.0 + with(chosen) * with(chosen));
-        match emission.light_type(lights, state.light) {
-            LightType::Area => {
-                let from = (state.origin.into(), -to_light);
-                let density = emission.density_of_emitter(scene, lights, state.light as usize, from);
-                let chosen = match (back, lights.triangle_of(state.light)) {
-                    (Some(_), Some(triangle)) => {
-                        let distance = position.distance(state.origin.into());
-                        lights.pdf_hit(scene, position, normal, triangle, distance, to_light)
-                    }
-                    _ => 0.0,
-                };
-                (density, by_chance(chosen))
-            }
-            LightType::Infinite => {
-                let density = emission.density_of_environment(scene, lights, to_light, position);
-                let chosen = match back {
-                    Some(_) => lights.pdf_escape(scene, position, normal, to_light),
-                    None => 0.0,
-                };
-                (density, by_chance(chosen))
-            }
-            LightType::Delta => {
-                let density = emission.density_of_delta(scene, lights, state.light, position);
-                (density, with(lights.probability(state.light, position, normal)))
-            }
-        }
+        let LightWalk { context, emission, .. } = &self.walk;
+        let at = Scatterer { point: vertex.point, bsdf: vertex.bsdf };
+        let origin = (state.light, state.origin.into());
+        let (kind, pdf, density) = at.densities_of_light(context, emission, origin, vertex.to_light);
+        let with = back.map_or(0.0, |back| pdf / back);
+        (density, if kind == LightType::Delta { with } else { libm::sqrtf(1.0 + with * with) })
     }
 }
 

@@ -1,41 +1,27 @@
 //! Light paths whose vertices become virtual lights: a pass whose tasks make one set each.
+//!
+//! No camera path meets a light without extent, and no light sample passes a mirror. So caustics of points,
+//! spots and directional lights are splatted to the camera with the weight 1 (Dutré et al. 1993).
 
-use super::caustic_splats::CausticSplats;
 use super::lights::{VirtualLight, holds_virtual_lights};
 use crate::bsdf::{BsdfSample, Features};
-use crate::film::{Splat, StripOffsets};
+use crate::film::Splat;
 use crate::light::{EmissionSampler, LightType};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::history::Rest;
 use crate::transport::walk::light::{
     Continuation, LightPathState, LightWalk, MAX_CONTINUATION, Vertex, Visitor,
 };
-use bytemuck::{Pod, Zeroable};
+use crate::transport::walk::splats::SplatQueue;
+use crate::transport::walk::subpath::{Vertex as Arrived, Walk};
+use crate::transport::walk::sums::{Counts, Sums};
+use crate::transport::walk::techniques::LightEnd;
+use crate::transport::walk::vertex::Scatterer;
 
 pub use crate::transport::walk::light::{PATHS_PER_TASK, VERTICES_PER_TASK};
-
-/// The outcome of a task beside its virtual lights and splats.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct SetOutput {
-    /// Virtual lights.
-    pub lights: u32,
-    offsets: StripOffsets,
-}
-
-impl SetOutput {
-    /// The splats of each strip in the task's list.
-    pub fn offsets(&self) -> &StripOffsets {
-        &self.offsets
-    }
-}
-
-/// True if some caustics are found by light paths alone: those of lights without extent by mirrors and smooth
-/// glass.
-pub fn has_hidden_caustics<F: Features>(context: &SceneContext<F>) -> bool {
-    context.has_mirrors && context.lights.has_delta_lights()
-}
+pub use crate::transport::walk::splats::TaskOutput;
 
 /// Traces light paths.
 #[derive(Clone, Copy)]
@@ -59,7 +45,7 @@ impl<'a, F: Features> LightPass<'a, F> {
 
     /// Working memory of a task.
     pub fn scratch() -> Footprint {
-        LightWalk::<F>::scratch().and(CausticSplats::footprint())
+        LightWalk::<F>::scratch().and(SplatQueue::footprint(PATHS_PER_TASK, PATHS_PER_TASK))
     }
 
     /// Makes set number `task` of pass number `pass` in `lights`, which has room for [`VERTICES_PER_TASK`],
@@ -74,26 +60,25 @@ impl<'a, F: Features> LightPass<'a, F> {
         scratch: &mut Arena,
         lights: &mut [VirtualLight],
         splats: &mut [Splat],
-        output: &mut SetOutput,
+        output: &mut TaskOutput,
     ) -> Result<Counters, OutOfMemory> {
         let Self { context, emission, settings, .. } = *self;
         let mut arena = scratch.scratch();
-        let has_splats = !splats.is_empty();
-        let caustics = if has_splats { Some(CausticSplats::new(&mut arena)?) } else { None };
-        let (sets, count) = (self.sets as f32, 0);
-        let mut writer = Writer { pass: self, lights, count, sets, caustics };
-        let walk = LightWalk {
-            context,
-            emission,
-            seed: settings.seed,
-            paths: (self.sets * PATHS_PER_TASK) as u32,
-            max_depth: settings.max_depth,
+        let PathSettings { seed, max_depth, width, height } = settings;
+        let queue = match splats.is_empty() {
+            true => None,
+            false => Some(SplatQueue::new((PATHS_PER_TASK, PATHS_PER_TASK), &mut arena)?),
         };
+        let (sets, count) = (self.sets as f32, 0);
+        let mut writer = Writer { pass: self, lights, count, sets, splats: queue };
+        let paths = (self.sets * PATHS_PER_TASK) as u32;
+        let walk = LightWalk { context, emission, seed, paths, max_depth };
         let mut counters = walk.follow(task, pass, &mut arena, &mut writer)?;
-        let lights = writer.count as u32;
-        let finish = |caustics: CausticSplats| caustics.finish((&context, &settings), splats, &mut counters);
-        let offsets = writer.caustics.map(finish).unwrap_or_default();
-        *output = SetOutput { lights, offsets };
+        let vertices = writer.count as u32;
+        let size = [width, height];
+        let finish = |queue: SplatQueue| queue.finish((&context, size), splats, &mut counters);
+        let offsets = writer.splats.map(finish).unwrap_or_default();
+        *output = TaskOutput { vertices, offsets };
         Ok(counters)
     }
 }
@@ -104,7 +89,29 @@ struct Writer<'w, F> {
     lights: &'w mut [VirtualLight],
     count: usize,
     sets: f32,
-    caustics: Option<CausticSplats<'w>>,
+    splats: Option<SplatQueue<'w>>,
+}
+
+impl<F: Features> Writer<'_, F> {
+    /// Splats light that nothing else finds.
+    fn splat(&mut self, state: &LightPathState, vertex: &Vertex, counters: &mut Counters) {
+        let LightPass { context, emission, settings, .. } = *self.pass;
+        let Some(queue) = self.splats.as_mut().filter(|_| state.segments < settings.max_depth) else {
+            return;
+        };
+        let counts = Counts { light_paths: 1.0, connections: 0.0, light_samples: 0.0 };
+        let walk = Walk { context, emission, size: [settings.width, settings.height], counts };
+        let at = Scatterer { point: vertex.point, bsdf: vertex.bsdf };
+        let end = LightEnd {
+            vertex: Arrived::new(at, -vertex.to_light),
+            power: state.power.into(),
+            factor: 1.0,
+            path_sums: Sums::default(),
+        };
+        if let Some(sample) = walk.splat(&end, || vertex.visitor_pair(), |_| 0.0) {
+            queue.push(sample, Rest::NONE, &context, counters);
+        }
+    }
 }
 
 impl<F: Features> Visitor for Writer<'_, F> {
@@ -117,13 +124,13 @@ impl<F: Features> Visitor for Writer<'_, F> {
         vertex: &Vertex,
         counters: &mut Counters,
     ) -> Option<Continuation> {
-        let LightPass { context, emission, settings, .. } = self.pass;
+        let LightPass { context, emission, .. } = self.pass;
         // Mirrors and smooth glass alone have led it here.
         let is_hidden = state.from_caster == 1
             && !vertex.bsdf.is_delta()
             && emission.light_type(&context.lights, state.light) == LightType::Delta;
-        if is_hidden && let Some(caustics) = &mut self.caustics {
-            let _ = caustics.add((context, settings), state, vertex);
+        if is_hidden {
+            self.splat(state, vertex, counters);
         }
         if holds_virtual_lights(vertex.bsdf) {
             match self.lights.get_mut(self.count) {

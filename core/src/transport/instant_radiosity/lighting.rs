@@ -12,7 +12,7 @@
 //! is left to light samples and to paths, as ever. So the mean is right for any bound b. Light of lights
 //! without extent that comes to y by mirrors and smooth glass, which no path finds, is not bounded.
 
-use super::lights::{VirtualLight, holds_virtual_lights, is_bent, is_lit_by_virtual_lights};
+use super::lights::{VirtualLight, holds_virtual_lights, is_lit_by_virtual_lights};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::geometry::Ray;
@@ -24,6 +24,7 @@ use crate::transport::path::{PathIntegrator, Sharing};
 use crate::transport::settings::PathSettings;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
+use crate::transport::walk::vertex::is_bent_at;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -132,7 +133,7 @@ impl<F: Features> LightEstimator<F> for VirtualLighting<'_> {
         let direction = between / libm::sqrtf(squared);
         let density = state.pdf * direction.dot(point.geometric_normal).abs() / squared;
         // At no distance nothing is connected.
-        if !density.is_finite() || is_bent(point, direction) {
+        if !density.is_finite() || is_bent_at(point, direction) {
             return 1.0;
         }
         if self.is_clamped { 0.0 } else { 1.0 - self.weight(density) }

@@ -3,9 +3,9 @@
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::geometry::{Hit, Ray};
-use crate::scene::SurfacePoint;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::light::{LightPathState, Vertex};
+use crate::transport::walk::vertex::{is_bent, is_bent_at};
 use bytemuck::{Pod, Zeroable};
 use core::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
@@ -38,9 +38,6 @@ const DIFFUSE: u32 = 1 << 31;
 /// Only virtual lights find its light: it has come from a light without extent by mirrors and smooth glass.
 const HIDDEN: u32 = 1 << 30;
 
-/// Lowest cosine of a direction to the shading normal below which that may be turned to the viewer.
-const LOWEST_COS: f32 = 2e-3;
-
 /// True if virtual lights are left on `bsdf`: it has a diffuse part, and no lobe in which a virtual light
 /// would be a spike, or nothing at all.
 #[inline]
@@ -52,13 +49,6 @@ pub(super) fn holds_virtual_lights(bsdf: &Bsdf) -> bool {
 #[inline]
 pub(super) fn is_lit_by_virtual_lights(bsdf: &Bsdf) -> bool {
     !bsdf.is_delta() && !bsdf.is_caustic_caster()
-}
-
-/// True if the shading normal of `point` may have been turned to its viewer in direction `to_viewer`, and
-/// depends on that. Virtual lights do not shine there.
-#[inline]
-pub(super) fn is_bent(point: &SurfacePoint, to_viewer: Vec3) -> bool {
-    point.frame.normal != point.geometric_normal && point.frame.normal.dot(to_viewer) < LOWEST_COS
 }
 
 /// The light that a virtual light sends to a point.
@@ -89,7 +79,7 @@ impl VirtualLight {
             place: vertex.barycentric,
         };
         match vertex.bsdf {
-            Bsdf::Diffuse(diffuse) if !is_bent(point, vertex.to_light) => {
+            Bsdf::Diffuse(diffuse) if !is_bent_at(point, vertex.to_light) => {
                 let cos = |normal: Vec3| vertex.to_light.dot(normal).abs();
                 // Power is counted by the normal of the triangle, scattering by that of shading (Veach 1997,
                 // 5.3).
@@ -131,7 +121,7 @@ impl VirtualLight {
         }
         let (radiance, error) = if self.segments & DIFFUSE != 0 {
             let shading = Vec3::from(self.direction);
-            if shading != normal && -direction.dot(shading) < LOWEST_COS {
+            if is_bent(shading, normal, -direction) {
                 return None;
             }
             (Rgb::from(self.power), self.place[0])
@@ -149,7 +139,7 @@ impl VirtualLight {
         let point = context.surface_at(&ray, &Hit { t: 1.0, u, v, triangle: self.triangle })?;
         let to_light = Vec3::from(self.direction);
         let wi = point.frame.to_local(to_light);
-        if is_bent(&point, -direction) || !point.sides_agree(wi, to_light) {
+        if is_bent_at(&point, -direction) || !point.sides_agree(wi, to_light) {
             return None;
         }
         let (value, _) = context.bsdf_at(&point).evaluate::<F>(point.frame.to_local(-direction), wi);

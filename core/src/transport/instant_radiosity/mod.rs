@@ -6,7 +6,6 @@
 //! bound cuts is found by the continuation of the path (Kollig and Keller 2004). Light of lights without
 //! extent that comes by mirrors and smooth glass is found by virtual lights and splats alone.
 
-mod caustic_splats;
 pub mod light_pass;
 pub mod lighting;
 pub mod lights;

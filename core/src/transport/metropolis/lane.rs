@@ -1,8 +1,9 @@
 //! A technique of one lane, and the numbers that its vertices take from blocks.
 
 use super::lanes::Lanes;
-use super::numbers::{Point, VertexNumbers};
+use super::numbers::Point;
 use super::technique::Technique;
+use crate::transport::walk::shading::VertexNumbers;
 
 /// A technique of one lane.
 pub(super) struct Lane<'p> {
@@ -16,7 +17,7 @@ impl Lane<'_> {
     /// Segments of its light subpath, and the numbers of the vertex under way; `None` at the last.
     #[inline]
     pub(super) fn of_light(&self, lanes: &Lanes) -> Option<(u32, VertexNumbers)> {
-        let segments = lanes.lights.get(self.number)?.segments;
+        let segments = lanes.lights.get(self.number)?.subpath.segments;
         let goes_on = segments < self.technique.subpaths(self.segments)[0];
         goes_on.then(|| {
             let scattering = Some(self.point.scattering(segments, true));

@@ -8,14 +8,12 @@
 
 pub mod bootstrap;
 pub mod chain;
-mod join;
 mod lane;
 pub mod lanes;
+mod light_subpath;
 pub(in crate::transport) mod numbers;
 pub mod paths;
-mod shading;
 pub mod split;
-mod subpath;
 pub mod target;
 mod technique;
 

@@ -2,6 +2,7 @@
 
 use crate::sampling::{Numbers, Random, Sampler};
 use crate::transport::walk::dimension;
+use crate::transport::walk::shading::VertexNumbers;
 
 /// Numbers that a point stores at most.
 pub(in crate::transport) const NUMBERS: usize = 128;
@@ -163,19 +164,6 @@ impl Numbers for EmissionNumbers<'_> {
     }
 }
 
-/// The numbers of a vertex in lanes.
-pub(super) enum VertexNumbers {
-    /// Those of a sequence, by its place and the index of its point: of a light sample and of scattering.
-    Sequence((u64, u32)),
-    /// Numbers of a light sample, and of scattering, if the vertex takes them.
-    Given {
-        /// Point on a light and choice of the light.
-        light: Option<[f32; 3]>,
-        /// Direction and lobe.
-        scattering: Option<[f32; 3]>,
-    },
-}
-
 /// The numbers of a whole path of path tracing.
 pub(super) trait PathNumbers {
     /// Point of the lens.
@@ -216,14 +204,11 @@ impl PathNumbers for PixelNumbers {
     }
 
     fn light(&self, n: u32) -> [f32; 3] {
-        let first = dimension::vertex(n);
-        let [u, v] = self.sampler.pair(first + dimension::LIGHT);
-        [u, v, self.sampler.single(first + dimension::LIGHT_CHOICE)]
+        dimension::light_sample(&self.sampler, n)
     }
 
     fn scattering(&self, n: u32) -> [f32; 3] {
-        let [u, v] = dimension::scattering(&self.sampler, n);
-        [u, v, self.sampler.single(dimension::vertex(n) + dimension::LOBE)]
+        dimension::bsdf_sample(&self.sampler, n)
     }
 
     fn roulette(&self, n: u32) -> f32 {

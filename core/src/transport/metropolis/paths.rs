@@ -2,9 +2,7 @@
 //! paths by mutated numbers, with the other part, are the points of PSSMLT (Kelemen et al. 2002).
 
 use super::numbers::{PathNumbers, PixelNumbers};
-use super::shading::{ShadedHit, Shading};
-use super::split::{Contribution, Split};
-use super::subpath::{Met, PATH_TRACING, Shadows, Subpath, Walk};
+use super::split::Split;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -14,7 +12,11 @@ use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::termination::{continuation_probability, is_cut};
+use crate::transport::walk::shading::{ShadedHit, Shading};
+use crate::transport::walk::subpath::{Subpath, Walk};
+use crate::transport::walk::sums::Counts;
+use crate::transport::walk::techniques::Weighted;
+use crate::transport::walk::vertex::Scatterer;
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
@@ -70,7 +72,7 @@ impl<'a, F: Features> Paths<'a, F> {
         split: Split<'a>,
     ) -> Self {
         let PathSettings { width, height, seed, max_depth } = settings;
-        let walk = Walk { counts: PATH_TRACING, ..Walk::new(context, emission, [width, height]) };
+        let walk = Walk { context, emission, size: [width, height], counts: Counts::PATH_TRACING };
         Self { walk, split, max_depth, seed }
     }
 
@@ -80,7 +82,7 @@ impl<'a, F: Features> Paths<'a, F> {
             .slice::<Path>(PIXELS_PER_TILE)
             .slice::<Ray>(PIXELS_PER_TILE)
             .slice::<Hit>(PIXELS_PER_TILE)
-            .and(shadows_footprint(PIXELS_PER_TILE))
+            .and(ShadowRays::footprint(PIXELS_PER_TILE))
     }
 
     /// Adds `samples` of tile `tile` to its pixels `out`, each with the light of `splats`, those of the
@@ -100,7 +102,7 @@ impl<'a, F: Features> Paths<'a, F> {
         let paths: &mut [Path] = arena.slice(PIXELS_PER_TILE)?;
         let rays: &mut [Ray] = arena.slice(PIXELS_PER_TILE)?;
         let hits: &mut [Hit] = arena.slice(PIXELS_PER_TILE)?;
-        let mut shadows = shadows(PIXELS_PER_TILE, &mut arena)?;
+        let mut shadows = ShadowRays::new(PIXELS_PER_TILE, &mut arena)?;
         let [width, height] = self.walk.size;
         let corner = tile * PIXELS_PER_TILE;
         let tile = Tile::new(width, height, tile);
@@ -146,38 +148,28 @@ impl<'a, F: Features> Paths<'a, F> {
         &self,
         (paths, rays, hits): (&mut [Path], &mut [Ray], &mut [Hit]),
         count: usize,
-        shadows: &mut Shadows,
+        shadows: &mut ShadowRays,
         numbers: impl Fn(&Path, u32) -> N,
         part: Part,
         counters: &mut Counters,
     ) {
-        let mut active = count;
+        let (context, mut active) = (&self.walk.context, count);
         let mut shading = Shading::new();
         let mut coherence = if part == Part::Paths { Coherence::Coherent } else { Coherence::Incoherent };
         while active > 0 {
-            counters.rays += active as u64;
-            self.walk.context.nearest_batch(&rays[..active], coherence, &mut hits[..active]);
+            let vertex = |paths: &[Path], tag: u32| {
+                let path = paths.get(tag as usize)?;
+                let segments = path.subpath.segments;
+                (segments < self.max_depth).then(|| (segments, numbers(path, tag).vertex(segments)))
+            };
+            let traced = (&mut rays[..active], &mut hits[..active], coherence);
+            active = shading.advance(context, traced, counters, paths, vertex, |paths, _, end, counters| {
+                let path = paths.get_mut(end.0.tag as usize)?;
+                let numbers = numbers(path, end.0.tag);
+                self.step(path, &numbers, end, shadows, part, counters)
+            });
             coherence = Coherence::Incoherent;
-            let mut left = 0;
-            for i in 0..active {
-                let vertex = |tag: u32| {
-                    let path = paths.get(tag as usize)?;
-                    let segments = path.subpath.segments;
-                    (segments < self.max_depth).then(|| (segments, numbers(path, tag).vertex(segments)))
-                };
-                let traced = (&rays[..active], &hits[..active]);
-                let met = shading.hit(&self.walk.context, traced, i, vertex);
-                let (ray, hit) = (rays[i], hits[i]);
-                let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
-                let numbers = numbers(path, ray.tag);
-                let end = (&ray, &hit, met);
-                if let Some(next) = self.step(path, &numbers, end, shadows, part, counters) {
-                    rays[left] = Ray { tag: ray.tag, ..next };
-                    left += 1;
-                }
-            }
-            active = left;
-            shadows.trace(&self.walk.context, counters, |ray, light| {
+            shadows.trace(context, counters, |ray, light| {
                 if let Some(path) = paths.get_mut(ray.tag as usize) {
                     path.add(light);
                 }
@@ -185,12 +177,12 @@ impl<'a, F: Features> Paths<'a, F> {
         }
     }
 
-    /// The part of a contribution of a path of `segments` segments that is added up.
-    fn part(&self, path: &Path, segments: u32, part: Part, contribution: &Contribution) -> Rgb {
+    /// The part of the `light` of a path of `segments` segments that is added up.
+    fn part(&self, path: &Path, segments: u32, part: Part, light: &Weighted) -> Rgb {
         // Roulette is no property of the path: the division does not know it.
-        let alone = Contribution { radiance: contribution.radiance * path.survival, ..*contribution };
+        let alone = Weighted { radiance: light.radiance * path.survival, ..*light };
         let of_paths = self.split.of_paths(path.pixel, segments, &alone);
-        contribution.radiance * if part == Part::Paths { of_paths } else { 1.0 - of_paths }
+        light.radiance * if part == Part::Paths { of_paths } else { 1.0 - of_paths }
     }
 
     /// One vertex of a path. The ray by which the path goes on.
@@ -199,72 +191,46 @@ impl<'a, F: Features> Paths<'a, F> {
         path: &mut Path,
         numbers: &impl PathNumbers,
         (ray, hit, shaded): (&Ray, &Hit, ShadedHit),
-        shadows: &mut Shadows,
+        shadows: &mut ShadowRays,
         part: Part,
         counters: &mut Counters,
     ) -> Option<Ray> {
+        let Self { walk, .. } = self;
         let direction = Vec3::from(ray.direction);
         let segments = path.subpath.segments;
-        let opacity = |n| numbers.opacity(n);
-        let met = (ray, hit, shaded.met);
-        let point = match self.walk.meet(&mut path.subpath, met, true, opacity, counters) {
-            Met::Surface(point) => point,
-            Met::Passed(next) => return Some(next),
-            Met::Lost => return None,
-            Met::Nothing => {
-                let seen = self.walk.escape(&path.subpath, direction)?;
-                path.add(self.part(path, segments, part, &seen));
-                return None;
-            }
-        };
-        if let Some(seen) = self.walk.emission(&path.subpath, &point, direction) {
+        if !hit.is_some() {
+            let seen = walk.escape(&path.subpath, direction)?;
+            path.add(self.part(path, segments, part, &seen));
+            return None;
+        }
+        let point = shaded.met.point()?;
+        let (met, opacity) = ((ray, hit, &point), |surfaces| numbers.opacity(surfaces));
+        if let Err(behind) = walk.stop(&mut path.subpath, met, true, opacity, counters) {
+            return behind;
+        }
+        if let Some(seen) = walk.emission(&path.subpath, &point, direction) {
             path.add(self.part(path, segments, part, &seen));
         }
         if segments >= self.max_depth {
             return None;
         }
-        let scene = self.walk.context.scene;
-        let surface = (point, shaded.bsdf::<F>(scene));
-        let vertex = self.walk.camera_vertex(&path.subpath, surface, direction, [0.5; 2]);
-        let sample = || self.walk.sample_light(&vertex, numbers.light(segments));
-        if !vertex.bsdf.is_delta()
-            && let Some(lit) = shaded.lit(&self.walk.context, sample)
-            && let Some((shadow, arrives)) = self.walk.light_sample(&path.subpath, &vertex, lit)
+        let bsdf = shaded.bsdf::<F>(walk.context.scene);
+        let at = Scatterer { point: &point, bsdf: &bsdf };
+        let vertex = walk.camera_vertex(&path.subpath, at, direction, [0.5; 2]);
+        let sample = || walk.sample_light(&vertex, numbers.light(segments));
+        if !bsdf.is_delta()
+            && let Some(lit) = shaded.lit(&walk.context, sample)
         {
-            shadows.push(ray.tag, shadow, self.part(path, segments + 1, part, &arrives));
-        }
-        let sample = shaded.scattered(|| vertex.bsdf.sample::<F>(vertex.wo, numbers.scattering(segments)))?;
-        let next = self.walk.scatter(&mut path.subpath, &vertex, false, &sample)?;
-        path.eta_squared *= sample.eta * sample.eta;
-        let throughput = Rgb::from(path.subpath.throughput);
-        let probability = continuation_probability(segments, throughput * path.eta_squared);
-        if probability < 1.0 {
-            if numbers.roulette(segments) >= probability {
-                return None;
+            let arrives = walk.light_sample(&path.subpath, &vertex, &lit);
+            if arrives.is_some() {
+                let light = self.part(path, segments + 1, part, &arrives);
+                shadows.push(Ray { tag: ray.tag, ..lit.ray }, light);
             }
-            path.subpath.throughput = (throughput / probability).to_array();
-            path.survival *= probability;
         }
-        if is_cut(segments, &vertex.bsdf, &sample) {
-            counters.dropped.unfinished += 1;
-            return None;
-        }
-        Some(next)
+        let sample = shaded.scattered(|| bsdf.sample::<F>(vertex.wo, numbers.scattering(segments)))?;
+        let at = (&path.subpath, path.eta_squared);
+        let (next, survival) = walk.next(at, &vertex, sample, || numbers.roulette(segments))?;
+        path.survival *= survival;
+        walk.go_on((&mut path.subpath, &mut path.eta_squared), &vertex, &next, None, counters)
     }
-}
-
-/// Memory of shadow rays that are traced together.
-pub(super) fn shadows_footprint(count: usize) -> Footprint {
-    Footprint::default().slice::<Ray>(count).slice::<[f32; 3]>(count).slice::<Hit>(count).slice::<u8>(count)
-}
-
-/// Shadow rays in `arena`.
-pub(super) fn shadows<'w>(count: usize, arena: &mut Arena<'w>) -> Result<Shadows<'w>, OutOfMemory> {
-    let rays = ShadowRays {
-        rays: arena.slice(count)?,
-        light: arena.slice(count)?,
-        hits: arena.slice(count)?,
-        hidden: arena.slice(count)?,
-    };
-    Ok(Shadows { rays, count: 0 })
 }

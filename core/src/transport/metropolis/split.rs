@@ -6,8 +6,8 @@
 //! no contribution exceeds T m. Chains have the rest, (1 − λ) F. λ depends on the path alone, so that both
 //! parts add up to F whatever m and T are.
 
-use crate::Rgb;
 use crate::light::luminance;
+use crate::transport::walk::techniques::Weighted;
 
 /// Pixels of a cell of the rough picture: 8 × 8, a run of the film.
 pub const CELL: usize = 64;
@@ -18,14 +18,6 @@ pub const MIN_SEGMENTS: u32 = 3;
 
 /// Most segments of such paths.
 pub const MAX_SEGMENTS: u32 = 20;
-
-/// Light that a technique brings, its weight included.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Contribution {
-    pub radiance: Rgb,
-    /// Share of the techniques of path tracing among the densities of all techniques.
-    pub by_paths: f32,
-}
 
 /// The division of light for one picture.
 #[derive(Clone, Copy, Debug)]
@@ -46,14 +38,14 @@ impl Split<'_> {
     }
 
     /// λ: the fraction of a path of `segments` segments that belongs to path tracing.
-    pub(super) fn of_paths(&self, position: u32, segments: u32, contribution: &Contribution) -> f32 {
+    pub(super) fn of_paths(&self, position: u32, segments: u32, light: &Weighted) -> f32 {
         if !(MIN_SEGMENTS..=self.max_segments).contains(&segments) {
             return 1.0;
         }
-        if contribution.by_paths <= 0.0 {
+        if light.by_paths <= 0.0 {
             return 0.0;
         }
-        let by_paths_alone = luminance(contribution.radiance) / contribution.by_paths;
+        let by_paths_alone = luminance(light.radiance) / light.by_paths;
         (self.threshold * self.level(position) / by_paths_alone).min(1.0)
     }
 }

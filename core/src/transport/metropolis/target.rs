@@ -6,12 +6,9 @@
 
 use super::lane::Lane;
 use super::lanes::{LANES, Lanes};
-use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail};
-use super::numbers::{VertexNumbers, slots_of_technique};
+use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail, slots_of_technique};
 use super::paths::{Part, Path, Paths};
-use super::shading::{ShadedHit, Shading};
-use super::split::{Contribution, MIN_SEGMENTS, Split};
-use super::subpath::{Met, Subpath, Vertex, Walk};
+use super::split::{MIN_SEGMENTS, Split};
 use super::technique::{Technique, technique};
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -22,7 +19,13 @@ use crate::light::{EmissionSampler, luminance};
 use crate::sampling::Mutation;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::shading::{ShadedHit, Shading, VertexNumbers};
+use crate::transport::walk::subpath::Walk;
+use crate::transport::walk::sums::Counts;
+use crate::transport::walk::techniques::{LensSample, Weighted};
+use crate::transport::walk::vertex::Scatterer;
 use bytemuck::{Pod, Zeroable};
+use core::mem::take;
 use glam::{Vec2, Vec3};
 
 /// Vertices from which a path of path tracing may be drawn anew.
@@ -78,7 +81,9 @@ impl<'a, F: Features> Target<'a, F> {
         space: PrimarySpace,
     ) -> Self {
         let PathSettings { width, height, .. } = settings;
-        let walk = Walk::new(context, emission, [width, height]);
+        let light_paths = width as f32 * height as f32;
+        let counts = Counts { light_paths, connections: 1.0, light_samples: 1.0 };
+        let walk = Walk { context, emission, size: [width, height], counts };
         Self { walk, paths: Paths::new(context, emission, settings, split), split, space }
     }
 
@@ -208,23 +213,14 @@ impl<'a, F: Features> Target<'a, F> {
         mut step: impl FnMut(&mut Lanes, (&Ray, &Hit, ShadedHit), &mut Counters) -> Option<Ray>,
     ) {
         let mut shading = Shading::new();
+        let (rays, hits) = (take(&mut lanes.rays), take(&mut lanes.hits));
         while active > 0 {
-            counters.rays += active as u64;
-            let (rays, hits) = (&lanes.rays[..active], &mut lanes.hits[..active]);
-            self.walk.context.nearest_batch(rays, Coherence::Incoherent, hits);
-            let mut left = 0;
-            for i in 0..active {
-                let traced = (&lanes.rays[..active], &lanes.hits[..active]);
-                let of_tag = |tag| numbers(lanes, tag);
-                let shaded = shading.hit(&self.walk.context, traced, i, of_tag);
-                let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
-                if let Some(next) = step(lanes, (&ray, &hit, shaded), counters) {
-                    lanes.rays[left] = Ray { tag: ray.tag, ..next };
-                    left += 1;
-                }
-            }
-            active = left;
+            let traced = (&mut rays[..active], &mut hits[..active], Coherence::Incoherent);
+            let step =
+                |lanes: &mut Lanes, _, end: (&_, &_, ShadedHit), counters: &mut _| step(lanes, end, counters);
+            active = shading.advance(&self.walk.context, traced, counters, lanes, &numbers, step);
         }
+        (lanes.rays, lanes.hits) = (rays, hits);
     }
 
     fn light_step(
@@ -236,29 +232,32 @@ impl<'a, F: Features> Target<'a, F> {
         counters: &mut Counters,
     ) -> Option<Ray> {
         let Lane { number, segments, technique, point: numbers } = *lane;
-        let subpath = &mut lanes.lights[number];
-        let opacity = |n| numbers.opacity(n, true);
-        let point = match self.walk.meet(subpath, (ray, hit, shaded.met), false, opacity, counters) {
-            Met::Surface(point) => point,
-            Met::Passed(next) => return Some(next),
-            Met::Nothing | Met::Lost => return None,
-        };
-        let vertex = self.walk.light_vertex(
-            subpath,
-            (point, shaded.bsdf::<F>(self.walk.context.scene)),
-            ray.direction.into(),
-        )?;
-        if subpath.segments < technique.subpaths(segments)[0] {
-            let u = || numbers.scattering(subpath.segments, true);
-            let sample = shaded.scattered(|| vertex.bsdf.sample::<F>(vertex.wo, u()))?;
-            return self.walk.scatter(subpath, &vertex, true, &sample);
+        let light = &mut lanes.lights[number];
+        let point = shaded.met.point()?;
+        let (met, opacity) = ((ray, hit, &point), |n| numbers.opacity(n, true));
+        if let Err(behind) = self.walk.stop(&mut light.subpath, met, false, opacity, counters) {
+            return behind;
         }
-        self.walk.end(subpath, &vertex);
+        let bsdf = shaded.bsdf::<F>(self.walk.context.scene);
+        let at = Scatterer { point: &point, bsdf: &bsdf };
+        let (vertex, path_sums) = self.walk.light_vertex(light, at, ray.direction.into())?;
+        let arrived = light.subpath.segments;
+        if arrived < technique.subpaths(segments)[0] {
+            let u = || numbers.scattering(arrived, true);
+            let sample = shaded.scattered(|| bsdf.sample::<F>(vertex.wo, u()))?;
+            return self.walk.scatter_light(light, (&vertex, &path_sums), &sample);
+        }
+        (light.subpath.sums, light.path_sums) = (vertex.sums, path_sums);
+        if bsdf.is_delta() {
+            return None;
+        }
         if technique == Technique::Splat {
-            let (pixel, shadow, contribution) = self.walk.splat(subpath, &vertex, numbers.lens())?;
-            value.pixel = pixel;
-            lanes.shadows.push(number as u32, shadow, self.part(pixel, segments, &contribution));
-        } else if !vertex.bsdf.is_delta() {
+            let end = self.walk.light_end(light, vertex);
+            let LensSample { position, ray, light } = self.walk.splat(&end, || numbers.lens(), |_| 0.0)?;
+            value.pixel = position;
+            let part = self.part(position, segments, &light);
+            lanes.shadows.push(Ray { tag: number as u32, ..ray }, part);
+        } else {
             (lanes.end_rays[number], lanes.end_hits[number]) = (*ray, *hit);
         }
         None
@@ -300,70 +299,59 @@ impl<'a, F: Features> Target<'a, F> {
         value: &mut Value,
         counters: &mut Counters,
     ) -> Option<Ray> {
+        let Self { walk, .. } = self;
         let Lane { number, segments, technique, point: numbers } = *lane;
         let subpath = &mut lanes.cameras[number];
         let direction = Vec3::from(ray.direction);
-        let opacity = |n| numbers.opacity(n, false);
         let is_last = subpath.segments == technique.subpaths(segments)[1];
         let is_hit = technique == Technique::Hit && is_last;
-        let point = match self.walk.meet(subpath, (ray, hit, shaded.met), true, opacity, counters) {
-            Met::Surface(point) => point,
-            Met::Passed(next) => return Some(next),
-            Met::Nothing if is_hit => {
-                let seen = self.walk.escape(subpath, direction)?;
-                value.radiance = self.part(value.pixel, segments, &seen).to_array();
-                return None;
-            }
-            Met::Nothing | Met::Lost => return None,
-        };
+        if !hit.is_some() && is_hit {
+            let seen = walk.escape(subpath, direction)?;
+            value.radiance = self.part(value.pixel, segments, &seen).to_array();
+        }
+        let point = shaded.met.point()?;
+        let (met, opacity) = ((ray, hit, &point), |n| numbers.opacity(n, false));
+        if let Err(behind) = walk.stop(subpath, met, true, opacity, counters) {
+            return behind;
+        }
         if is_hit {
-            let seen = self.walk.emission(subpath, &point, direction)?;
+            let seen = walk.emission(subpath, &point, direction)?;
             value.radiance = self.part(value.pixel, segments, &seen).to_array();
             return None;
         }
-        let surface = (point, shaded.bsdf::<F>(self.walk.context.scene));
-        let vertex = self.walk.camera_vertex(subpath, surface, direction, numbers.lens());
+        let bsdf = shaded.bsdf::<F>(walk.context.scene);
+        let at = Scatterer { point: &point, bsdf: &bsdf };
+        let vertex = walk.camera_vertex(subpath, at, direction, numbers.lens());
         if !is_last {
             let u = || numbers.scattering(subpath.segments, false);
-            let sample = shaded.scattered(|| vertex.bsdf.sample::<F>(vertex.wo, u()))?;
-            return self.walk.scatter(subpath, &vertex, false, &sample);
+            let sample = shaded.scattered(|| bsdf.sample::<F>(vertex.wo, u()))?;
+            let throughput = Rgb::from(subpath.throughput) * sample.weight;
+            return walk.scatter(subpath, &vertex, (&sample, at.towards(&sample)?), throughput, None);
         }
-        if vertex.bsdf.is_delta() {
+        if bsdf.is_delta() {
             return None;
         }
-        let (shadow, contribution) = match technique {
+        let (shadow, light) = match technique {
             Technique::LightSample => {
-                let sample = || self.walk.sample_light(&vertex, numbers.light_sample());
-                let lit = shaded.lit(&self.walk.context, sample)?;
-                self.walk.light_sample(subpath, &vertex, lit)?
+                let sample = || walk.sample_light(&vertex, numbers.light_sample());
+                let lit = shaded.lit(&walk.context, sample)?;
+                let light = walk.light_sample(subpath, &vertex, &lit);
+                light.is_some().then_some((lit.ray, light))?
             }
             _ => {
-                let (light, end) =
-                    (&lanes.lights[number], (&lanes.end_rays[number], &lanes.end_hits[number]));
-                self.connect((subpath, &vertex), light, end)?
+                let end = (&lanes.end_rays[number], &lanes.end_hits[number]);
+                walk.connect((subpath, &vertex), &lanes.lights[number], end)?
             }
         };
-        lanes.shadows.push(number as u32, shadow, self.part(value.pixel, segments, &contribution));
+        let part = self.part(value.pixel, segments, &light);
+        lanes.shadows.push(Ray { tag: number as u32, ..shadow }, part);
         None
     }
 
-    /// The connection with a light subpath that has ended where its `ray` met `hit`.
-    fn connect(
-        &self,
-        camera: (&Subpath, &Vertex),
-        light: &Subpath,
-        (ray, hit): (&Ray, &Hit),
-    ) -> Option<(Ray, Contribution)> {
-        let point = self.walk.context.surface_at(ray, hit)?;
-        let surface = (point, self.walk.context.bsdf_at(&point));
-        let other = self.walk.light_surface(surface, ray.direction.into())?;
-        self.walk.connection(camera, (light, &other))
-    }
-
     /// The part of chains of a technique's light, times the number of techniques.
-    fn part(&self, pixel: u32, segments: u32, contribution: &Contribution) -> Rgb {
-        let rest = 1.0 - self.split.of_paths(pixel, segments, contribution);
-        contribution.radiance * (rest * Technique::count(segments) as f32)
+    fn part(&self, pixel: u32, segments: u32, light: &Weighted) -> Rgb {
+        let rest = 1.0 - self.split.of_paths(pixel, segments, light);
+        light.radiance * (rest * Technique::count(segments) as f32)
     }
 
     /// The place in the picture of a camera subpath, and the position of its pixel in the film.

@@ -1,8 +1,9 @@
 //! Lengths, techniques and the division of light.
 
 use super::bootstrap::Lengths;
-use super::split::{Contribution, Split};
+use super::split::Split;
 use crate::Rgb;
+use crate::transport::walk::techniques::Weighted;
 use std::vec::Vec;
 
 #[test]
@@ -23,7 +24,7 @@ fn lengths_are_chosen_by_their_weight_and_none_never() {
 fn path_tracing_and_chains_share_all_light_and_paths_never_exceed_the_threshold() {
     let levels = [2.0];
     let split = Split { levels: &levels, threshold: 8.0, max_segments: 20 };
-    let with = |radiance: f32, by_paths: f32| Contribution { radiance: Rgb::splat(radiance), by_paths };
+    let with = |radiance: f32, by_paths: f32| Weighted { radiance: Rgb::splat(radiance), by_paths };
     // The path tracer's own contribution is 20 / 0.5.
     assert!((split.of_paths(63, 3, &with(20.0, 0.5)) - 0.4).abs() < 1e-6);
     assert_eq!(split.of_paths(0, 3, &with(1.0, 0.5)), 1.0);

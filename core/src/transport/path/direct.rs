@@ -11,7 +11,7 @@ use crate::light::LightSample;
 use crate::sampling::Sampler;
 use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
-use crate::transport::wavefront::TO_ENVIRONMENT;
+use crate::transport::walk::shadow_tag::ShadowTag;
 use crate::transport::wavefront::Wavefront;
 use glam::Vec3;
 
@@ -56,8 +56,8 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
                 && let Some((ray, light)) =
                     self.light_contribution((state, &mut *shared), vertex, rest, (&sample, later))
             {
-                let tag = vertex.path as u32 | if later { TO_ENVIRONMENT } else { 0 };
-                wave.push_shadow_ray(Ray { tag, ..ray }, light);
+                let ShadowTag(tag) = ShadowTag::of_light_sample(vertex.path as u32, later);
+                wave.shadows.push(Ray { tag, ..ray }, light);
             }
         }
     }

@@ -10,10 +10,11 @@ use crate::scene::SurfacePoint;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::path_classes::PathClasses;
-use crate::transport::wavefront::{BLOCK, Wavefront};
+use crate::transport::wavefront::Wavefront;
 use bytemuck::Pod;
 use core::ops::Range;
 use glam::Vec3;
+use halflight_simd::kernels::shade::BLOCK;
 
 /// Surface point of a path, its BSDF, and the quantities of the path so far.
 pub struct PathVertex<'v, 'a> {

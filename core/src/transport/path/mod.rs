@@ -1,7 +1,7 @@
 //! Unidirectional path tracer with next-event estimation and multiple importance sampling (Kajiya 1986; Veach
 //! 1997, chapter 9).
 //!
-//! The plain algorithm is [`crate::transport::path::reference`]. Departures from it:
+//! The plain algorithm is [`single`]. Departures from it:
 //! 1. All paths of a wave advance together (`wavefront.rs`).
 //! 2. Shadow rays are traced after all vertices of the wave are shaded; their light is added to the path
 //!    then.
@@ -22,12 +22,14 @@ mod direct;
 pub(in crate::transport) mod estimator;
 mod lanes;
 pub(in crate::transport) mod pixels;
+#[cfg(feature = "reference")]
 pub mod reference;
 pub(in crate::transport) mod reuse;
 pub mod reuse_pilot;
-mod shade;
+mod scalar;
 pub(in crate::transport) mod sharing;
 pub(in crate::transport) mod silhouette;
+pub mod single;
 
 pub use crate::transport::wavefront::WAVE;
 pub use estimator::LightEstimator;
@@ -47,11 +49,12 @@ use crate::transport::walk::block::Block;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::path_classes::PathClasses;
-use crate::transport::wavefront::{BLOCK, Wavefront};
+use crate::transport::wavefront::Wavefront;
 use crate::{Level, Rgb};
 use core::ops::Range;
+use halflight_simd::kernels::shade::BLOCK;
 use halflight_simd::kernels::shade::numbers::SampleBlock;
-use shade::Shading;
+use lanes::Shading;
 use sharing::PathWave;
 use silhouette::silhouette_pixels;
 
@@ -176,7 +179,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             }
             for i in 0..count {
                 let path = wave.wave.paths[i];
-                let emission = if has_silhouette { Rgb::from(wave.wave.shadow_light[i]) } else { Rgb::ZERO };
+                let emission = if has_silhouette { Rgb::from(wave.wave.shadows.light[i]) } else { Rgb::ZERO };
                 let radiance = wave.radiance(i) + emission + self.estimator.splat(path.place);
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
                 if pixel.add(path.sample, radiance, &mut counters.dropped) {

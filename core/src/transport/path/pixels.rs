@@ -53,7 +53,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             for i in 0..count {
                 let path = wave.wave.paths[i];
                 if let Some(pixel) = out.get_mut(path.place as usize) {
-                    let radiance = wave.radiance(i) + Rgb::from(wave.wave.shadow_light[i]);
+                    let radiance = wave.radiance(i) + Rgb::from(wave.wave.shadows.light[i]);
                     pixel.add(path.sample, radiance, &mut counters.dropped);
                 }
             }

@@ -28,7 +28,6 @@ use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::visibility::ShadowRays;
 use crate::transport::wavefront::{PathState, Wavefront};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -269,7 +268,7 @@ impl Sharing for PathReuse {
         for (state, path) in memory.shared.iter_mut().zip(wave.paths.iter_mut()).take(count) {
             state.finish(path);
         }
-        let (mut pairs, mut rays, mut circle) = (0, 0, 0..0);
+        let (mut pairs, mut circle) = (0, 0..0);
         for j in 0..count {
             if j >= circle.end {
                 circle = j..end_of_circle(&memory.shared[..count], j);
@@ -279,8 +278,8 @@ impl Sharing for PathReuse {
                 continue;
             }
             if pairs + CIRCLE > memory.pairs.len() {
-                self.distribute_pairs(context, wave, memory, (pairs, rays), counters);
-                (pairs, rays) = (0, 0);
+                self.distribute_pairs(context, wave, memory, pairs, counters);
+                pairs = 0;
             }
             for k in circle.clone() {
                 let target = &memory.shared[k];
@@ -291,29 +290,28 @@ impl Sharing for PathReuse {
                 if density > 0.0 && density < f32::INFINITY {
                     memory.pairs[pairs] = Connection { source: j as u32, target: k as u32, density };
                     if k != j {
-                        wave.shadow_rays[rays] = Ray { tag: pairs as u32, ..source.y.ray_to(&target.x) };
-                        wave.shadow_light[rays] = [density; 3];
-                        rays += 1;
+                        let ray = Ray { tag: pairs as u32, ..source.y.ray_to(&target.x) };
+                        wave.shadows.push(ray, Rgb::splat(density));
                     }
                     pairs += 1;
                 }
             }
         }
-        self.distribute_pairs(context, wave, memory, (pairs, rays), counters);
+        self.distribute_pairs(context, wave, memory, pairs, counters);
     }
 }
 
 impl PathReuse {
-    /// Traces the first `rays` connections of the first `pairs` pairs and distributes the shares.
+    /// Traces the connections of the first `pairs` pairs and distributes the shares.
     fn distribute_pairs<F: Features, S>(
         &self,
         context: &SceneContext<F>,
         wave: &mut Wavefront,
         memory: &mut PathMemory<S, Self>,
-        (pairs, rays): (usize, usize),
+        pairs: usize,
         counters: &mut Counters,
     ) {
-        trace_connections(context, wave, memory.pairs, rays, counters);
+        trace_connections(context, wave, memory.pairs, counters);
         let PathMemory { shared, pairs: all, .. } = memory;
         let mut rest = &all[..pairs];
         while let Some(first) = rest.first() {
@@ -349,21 +347,18 @@ impl PathReuse {
     }
 }
 
-/// Multiplies the densities of `pairs` by the transmittance V of the first `rays` rays between them.
+/// Multiplies the densities of `pairs` by the transmittance V of the queued rays between them.
 fn trace_connections<F: Features>(
     context: &SceneContext<F>,
     wave: &mut Wavefront,
     pairs: &mut [Connection],
-    rays: usize,
     counters: &mut Counters,
 ) {
-    for ray in &wave.shadow_rays[..rays] {
+    let shadows = &mut wave.shadows;
+    for ray in &shadows.rays[..shadows.count] {
         pairs[ray.tag as usize].density = 0.0;
     }
-    let Wavefront { shadow_rays: rays_of, shadow_light: light, hits, hidden, .. } = wave;
-    let mut shadows = ShadowRays { rays: rays_of, light, hits, hidden };
-    let arrive = |ray: &Ray, density: Rgb| pairs[ray.tag as usize].density = density.x;
-    context.trace_shadow_rays(&mut shadows, rays, &mut counters.shadow_rays, arrive);
+    shadows.trace(context, counters, |ray, density| pairs[ray.tag as usize].density = density.x);
 }
 
 /// End of the circle of path `first`.

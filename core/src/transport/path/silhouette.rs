@@ -197,7 +197,7 @@ pub(in crate::transport) fn emission<F: Features>(
 }
 
 impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
-    /// Sets `wave.shadow_light` of the first `count` paths to the emission of lamps in their pixels, or to
+    /// Sets `wave.shadows.light` of the first `count` paths to the emission of lamps in their pixels, or to
     /// zero if the place of the pixel is not `on_silhouette`.
     pub(super) fn trace_silhouettes(
         &self,
@@ -208,7 +208,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
     ) {
         let (mut filled, capacity) = (0, wave.rays.len());
         for i in 0..count {
-            wave.shadow_light[i] = [0.0; 3];
+            wave.shadows.light[i] = [0.0; 3];
             let path = wave.paths[i];
             if !on_silhouette(path.place) {
                 continue;
@@ -230,7 +230,7 @@ impl<F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> 
         wave.trace(&self.context, count, Coherence::Coherent, counters);
         for (ray, hit) in wave.rays.iter().zip(&*wave.hits).take(count) {
             let light = emission(&self.context, *ray, *hit);
-            if let Some(sum) = wave.shadow_light.get_mut(ray.tag as usize) {
+            if let Some(sum) = wave.shadows.light.get_mut(ray.tag as usize) {
                 *sum = (Rgb::from(*sum) + light).to_array();
             }
         }

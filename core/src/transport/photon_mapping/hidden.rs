@@ -29,11 +29,6 @@ pub struct Techniques {
     pub connections: bool,
 }
 
-/// True if a picture by a method without photons may lack light.
-pub fn may_be_hidden<F: Features>(context: &SceneContext<F>) -> bool {
-    context.has_mirrors && context.lights.has_delta_lights()
-}
-
 /// Tracer of the photons of hidden light.
 #[derive(Clone, Copy)]
 pub struct HiddenLightTracer<'a, F> {

@@ -11,6 +11,7 @@ use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::{SceneContext, Segment};
 use crate::transport::walk::dimension;
+use crate::transport::walk::vertex::Scatterer;
 use crate::{Level, Rgb};
 use core::mem;
 use glam::Vec3;
@@ -130,13 +131,8 @@ impl VisiblePointSampler {
                     has_joint,
                 });
             }
-            let [u, v] = dimension::scattering(&sampler, segments);
-            let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
-            let sample = bsdf.sample::<F>(point.frame.to_local(-direction), [u, v, lobe])?;
-            let onward = point.frame.to_world(sample.direction);
-            if !point.sides_agree(sample.direction, onward) {
-                return None;
-            }
+            let at = Scatterer { point: &point, bsdf: &bsdf };
+            let (sample, onward) = at.sample::<F>(direction, dimension::bsdf_sample(&sampler, segments))?;
             throughput *= sample.weight;
             has_joint |= is_rough && !sample.delta;
             is_rough = !sample.delta;

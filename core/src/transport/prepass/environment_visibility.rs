@@ -20,6 +20,7 @@ use crate::transport::path::PathIntegrator;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::Segment;
 use crate::transport::walk::dimension;
+use crate::transport::walk::vertex::Scatterer;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -256,12 +257,9 @@ impl<F: Features> PathIntegrator<'_, F> {
             }
             let first = 2 + 3 * surface;
             let ([u, v], lobe) = (sampler.pair(first + 1), sampler.single(first + 2));
-            let wo = point.frame.to_local(-Vec3::from(segment.ray.direction));
-            let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return };
-            let direction = point.frame.to_world(sample.direction);
-            if !point.sides_agree(sample.direction, direction) {
-                return;
-            }
+            let at = Scatterer { point: &point, bsdf: &bsdf };
+            let sampled = at.sample::<F>(segment.ray.direction.into(), [u, v, lobe]);
+            let Some((_, direction)) = sampled else { return };
             segment = segment.onward(&point, &hit, direction);
         }
     }

@@ -6,6 +6,7 @@ use crate::bsdf::{COATS, Features};
 use crate::geometry::Ray;
 use crate::light::{ChosenLight, LightSample, emitted};
 use crate::transport::walk::block::Block;
+use crate::transport::walk::block_stages::Numbered;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::points::Set;
 use glam::{Vec2, Vec3};
@@ -19,7 +20,7 @@ use halflight_simd::kernels::shade::{BLOCK, at, put};
 impl Block<'_> {
     /// Leaves the vertices in `lit` that light samples can reach, and sets the normals for light sampling.
     #[inline]
-    pub(in crate::transport) fn begin_light(&mut self, lit: u32) -> u32 {
+    pub(crate) fn begin_light(&mut self, _: &Numbered, lit: u32) -> u32 {
         let mut lit = lit & !(self.specular.exists | self.smooth_coats);
         self.side = self.points.surface.frame[2];
         for i in Set(lit & !self.in_lanes()) {
@@ -36,7 +37,7 @@ impl Block<'_> {
     /// Samples lights at the vertices in `lit`, which [`Block::begin_light`] has left, and evaluates the
     /// BSDFs that lanes of shadow rays do not.
     #[inline]
-    pub(in crate::transport) fn light<F: Features>(&mut self, context: &SceneContext<F>, lit: u32) {
+    pub(crate) fn light<F: Features>(&mut self, context: &SceneContext<F>, lit: u32) {
         self.sample_lights(context, lit);
         for i in Set(lit & self.light.exists & !self.in_lanes()) {
             let wi = self.points.point(i).frame.to_local(at(&self.light.direction, i).into());
@@ -62,9 +63,14 @@ impl Block<'_> {
     /// Takes light samples at the vertices in `lit`: unweighted shadow rays, with f |cos| and the density of
     /// BSDF sampling.
     #[inline]
-    pub(in crate::transport) fn reach_lights<F: Features>(&mut self, context: &SceneContext<F>, lit: u32) {
+    pub(crate) fn reach_lights<F: Features>(
+        &mut self,
+        context: &SceneContext<F>,
+        stage: &Numbered,
+        lit: u32,
+    ) {
         self.shadows.exists = 0;
-        let lit = if context.lights.is_empty() { 0 } else { self.begin_light(lit) };
+        let lit = if context.lights.is_empty() { 0 } else { self.begin_light(stage, lit) };
         if lit != 0 {
             self.light(context, lit);
             let Block { points, bsdf, light, value, pdf, each, throughput, shadows, .. } = self;
@@ -75,14 +81,14 @@ impl Block<'_> {
 
     /// Shadow ray of vertex `i`, which has one.
     #[inline]
-    pub(in crate::transport) fn shadow_ray<F: Features>(&self, context: &SceneContext<F>, i: usize) -> Ray {
+    pub(crate) fn shadow_ray<F: Features>(&self, context: &SceneContext<F>, i: usize) -> Ray {
         let ray = bytemuck::cast(self.shadows.rays[i]);
         if self.light.area >> i & 1 == 1 { context.ended_at_lamp(self.sampled[i], ray) } else { ray }
     }
 
     /// Evaluates and weighs the light samples of coats apart from their bases, after [`Block::light`].
     #[inline]
-    pub(in crate::transport) fn weigh_apart(&mut self, level: Level) {
+    pub(crate) fn weigh_apart(&mut self, level: Level) {
         let Block { points, coats, light, each, throughput, apart, supplied, .. } = self;
         let (surface, tables, supplied) = (&points.surface, &COATS, *supplied);
         ApartLight { surface, coats, tables, light, each, throughput, supplied }.compute(level, apart);

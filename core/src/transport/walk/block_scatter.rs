@@ -3,6 +3,7 @@
 use crate::Level;
 use crate::bsdf::{BsdfSample, COATS, Features};
 use crate::transport::walk::block::Block;
+use crate::transport::walk::block_stages::{Filled, Numbered};
 use crate::transport::walk::dimension;
 use crate::transport::walk::points::Set;
 use crate::transport::walk::termination::{CERTAIN_BELOW, MAX_VERTICES, is_cut, most_probable};
@@ -16,31 +17,22 @@ use halflight_simd::kernels::shade::{BLOCK, Row, at, put};
 
 /// Sets of vertices for [`Scatter`], and for the paths that go on.
 #[derive(Default)]
-pub(in crate::transport) struct Sets {
-    pub(in crate::transport) active: u32,
+pub(crate) struct Sets {
+    pub(crate) active: u32,
     /// Paths that must survive.
-    pub(in crate::transport) certain: u32,
+    pub(crate) certain: u32,
     /// Paths that are too long.
-    pub(in crate::transport) cut: u32,
-    pub(in crate::transport) delta: u32,
+    pub(crate) cut: u32,
+    pub(crate) delta: u32,
     /// Samples of coats apart from their bases.
-    pub(in crate::transport) coat: u32,
-    pub(in crate::transport) transmits: u32,
+    pub(crate) coat: u32,
+    pub(crate) transmits: u32,
 }
 
 impl Block<'_> {
-    /// Random numbers of the vertices; those of the choice of a light only if it `chooses`.
-    #[inline]
-    pub(in crate::transport) fn number(&mut self, level: Level, chooses: bool) {
-        for (first, segments) in self.samples.dimension.iter_mut().zip(self.segments) {
-            *first = dimension::vertex(segments);
-        }
-        self.samples.vertices(level, dimension::OFFSETS, chooses, &mut self.numbers);
-    }
-
     /// Samples the BSDFs of the vertices `onward`, except for those that [`Scatter`] samples.
     #[inline]
-    pub(in crate::transport) fn sample_bsdfs<F: Features>(&mut self, level: Level, onward: u32) -> Sets {
+    pub(crate) fn sample_bsdfs<F: Features>(&mut self, level: Level, _: &Numbered, onward: u32) -> Sets {
         let starts = onward & Set::of(&self.segments, |segments| segments == 1);
         if starts != 0 {
             let pairs = self.samples.second_pairs(level, dimension::PIXEL);
@@ -137,7 +129,7 @@ impl Block<'_> {
 
     /// Plays roulette and computes the next rays, after [`Block::sample_bsdfs`].
     #[inline]
-    pub(in crate::transport) fn scatter(&mut self, level: Level, sets: &Sets) {
+    pub(crate) fn scatter(&mut self, level: Level, sets: &Sets) {
         let Block { points, bsdf, given, numbers, most, throughput, factor, eta_squared, next, .. } = self;
         let (surface, u, roulette) = (&points.surface, &numbers.scatter, &numbers.roulette);
         let Sets { active, certain, .. } = *sets;
@@ -148,9 +140,10 @@ impl Block<'_> {
     /// Samples the BSDFs of the vertices `onward` of light subpaths, with random numbers at `offsets` from
     /// the first dimensions of the vertices. They go into the given samples.
     #[inline]
-    pub(in crate::transport) fn sample_from_lights<F: Features>(
+    pub(crate) fn sample_from_lights<F: Features>(
         &mut self,
         level: Level,
+        _: Filled,
         (offsets, lobe): (Offsets, u32),
         onward: u32,
     ) -> Sets {
@@ -164,9 +157,10 @@ impl Block<'_> {
     /// Samples the BSDFs of the vertices `onward` by the numbers of the block and those of the lobes. They go
     /// into the given samples.
     #[inline]
-    pub(in crate::transport) fn sample_by_numbers<F: Features>(
+    pub(crate) fn sample_by_numbers<F: Features>(
         &mut self,
         level: Level,
+        _: &Numbered,
         lobe: &Row,
         onward: u32,
     ) -> Sets {
@@ -179,7 +173,7 @@ impl Block<'_> {
 
     /// Adds the samples of the BSDFs that [`Scatter`] samples to those given.
     #[inline]
-    pub(in crate::transport) fn sample_all(&mut self, level: Level, sets: &mut Sets) {
+    pub(crate) fn sample_all(&mut self, level: Level, sets: &mut Sets) {
         let Block { points, bsdf, given, numbers, most, throughput, factor, eta_squared, .. } = &*self;
         let (surface, u, roulette) = (&points.surface, &numbers.scatter, &numbers.roulette);
         let Sets { active, certain, .. } = *sets;
@@ -201,7 +195,7 @@ impl Block<'_> {
 
     /// The given sample of vertex `i`, with the `sets` of its block. The density of a delta lobe is infinite.
     #[inline]
-    pub(in crate::transport) fn sample(&self, sets: &Sets, i: usize) -> Option<BsdfSample> {
+    pub(crate) fn sample(&self, sets: &Sets, i: usize) -> Option<BsdfSample> {
         let i = i & 15;
         let direction = Vec3::from(at(&self.given.direction, i));
         (sets.active >> i & 1 == 1).then(|| BsdfSample {

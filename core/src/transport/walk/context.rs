@@ -8,6 +8,7 @@ use crate::light::LightSampler;
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::settings::Counters;
 use crate::transport::walk::termination::MAX_CROSSINGS;
+use bytemuck::{Pod, Zeroable};
 use core::marker::PhantomData;
 use glam::Vec3;
 
@@ -23,32 +24,42 @@ pub struct SceneContext<'a, F> {
     /// Highest instruction set to use.
     pub level: Level,
     /// True if a surface may have an opacity below 1, so that shadow rays continue behind a hit.
-    pub(in crate::transport) has_cutouts: bool,
+    pub(crate) has_cutouts: bool,
     /// True if a surface may reflect or refract in a single direction only.
-    pub(in crate::transport) has_mirrors: bool,
+    pub(crate) has_mirrors: bool,
     features: PhantomData<F>,
+}
+
+/// Origin of a ray of a subpath.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Origin {
+    /// Its triangle, which the ray cannot hit again; [`MISS`] at the camera.
+    pub(crate) triangle: u32,
+    /// Surfaces that the subpath has passed so far, by cut-out or rounding.
+    pub(crate) crossings: u32,
 }
 
 /// Ray between two surfaces of a subpath.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::transport) struct Segment {
-    pub(in crate::transport) ray: Ray,
+pub(crate) struct Segment {
+    pub(crate) ray: Ray,
     /// Triangle at the origin of the ray, which the ray cannot hit again; [`MISS`] at the camera.
-    pub(in crate::transport) triangle: u32,
+    pub(crate) triangle: u32,
     /// Number of surfaces of the subpath so far, both scattering and skipped.
-    pub(in crate::transport) surfaces: u32,
+    pub(crate) surfaces: u32,
     /// Distance from the last scattering surface, in lengths of the ray's direction.
-    pub(in crate::transport) length: f32,
+    pub(crate) length: f32,
 }
 
 impl Segment {
     /// First segment of a subpath, from the camera or a light.
-    pub(in crate::transport) fn first(ray: Ray) -> Self {
+    pub(crate) fn first(ray: Ray) -> Self {
         Self { ray, triangle: MISS, surfaces: 0, length: 0.0 }
     }
 
     /// Next segment, from `point` on the triangle of `hit` along `direction`, in world space.
-    pub(in crate::transport) fn onward(&self, point: &SurfacePoint, hit: &Hit, direction: Vec3) -> Self {
+    pub(crate) fn onward(&self, point: &SurfacePoint, hit: &Hit, direction: Vec3) -> Self {
         Self { ray: point.spawn(direction), triangle: hit.triangle, surfaces: self.surfaces + 1, length: 0.0 }
     }
 }
@@ -64,20 +75,26 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// True if blocks of vertices are shaded in lanes. The baseline gains nothing by them, as measured with
     /// SSE2.
     #[inline]
-    pub(in crate::transport) fn has_lanes(&self) -> bool {
+    pub(crate) fn has_lanes(&self) -> bool {
         cfg!(target_arch = "x86_64") && self.level > Level::BASELINE
+    }
+
+    /// True if light of lights without extent may come by mirrors and smooth glass, which camera paths do not
+    /// find.
+    pub fn has_hidden_light(&self) -> bool {
+        self.has_mirrors && self.lights.has_delta_lights()
     }
 
     /// Nearest hit of `ray`.
     #[inline]
-    pub(in crate::transport) fn nearest(&self, ray: &Ray) -> Hit {
+    pub(crate) fn nearest(&self, ray: &Ray) -> Hit {
         let hit = self.bvh.nearest(self.level, ray);
         if self.scene.mesh.overlaps.is_empty() { hit } else { self.scene.visible_hit(ray, hit) }
     }
 
     /// Nearest hits of `rays`.
     #[inline]
-    pub(in crate::transport) fn nearest_batch(&self, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
+    pub(crate) fn nearest_batch(&self, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         self.bvh.nearest_batch(self.level, rays, coherence, hits);
         if !self.scene.mesh.overlaps.is_empty() {
             rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.scene.visible_hit(ray, *hit));
@@ -86,13 +103,13 @@ impl<'a, F: Features> SceneContext<'a, F> {
 
     /// Surface point of `ray` at `hit`.
     #[inline]
-    pub(in crate::transport) fn surface_at(&self, ray: &Ray, hit: &Hit) -> Option<SurfacePoint<'a>> {
+    pub(crate) fn surface_at(&self, ray: &Ray, hit: &Hit) -> Option<SurfacePoint<'a>> {
         SurfacePoint::at::<F>(self.scene, ray, hit).filter(|_| hit.is_some())
     }
 
     /// BSDF at `point`.
     #[inline]
-    pub(in crate::transport) fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
+    pub(crate) fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
         Bsdf::at::<F>(self.scene, point.material, point.uv, point.front)
     }
 
@@ -100,32 +117,52 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// whose coats are then sampled separately. Paths that leave by a coat have to find all light; they
     /// cannot find point and directional lights behind mirrors and smooth glass.
     #[inline]
-    pub(in crate::transport) fn separates_coats(&self) -> bool {
-        !(self.has_mirrors && self.lights.has_delta_lights())
+    pub(crate) fn separates_coats(&self) -> bool {
+        !self.has_hidden_light()
     }
 
     /// True if a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`
     /// (evaluated for cut-outs only), or the ray's own triangle, hit by rounding.
     #[inline]
-    pub(in crate::transport) fn is_skipped(
-        &self,
-        point: &SurfacePoint,
-        hit: &Hit,
-        left: u32,
-        random: impl FnOnce() -> f32,
-    ) -> bool {
+    fn is_skipped(&self, point: &SurfacePoint, hit: &Hit, left: u32, random: impl FnOnce() -> f32) -> bool {
         hit.triangle == left || F::CUTOUT && point.material.has_cutout() && random() >= self.opacity_at(point)
+    }
+
+    /// `Err` if a `ray` from `origin` passes `point`, its `hit`: the ray behind it, or `None` after
+    /// [`MAX_CROSSINGS`] surfaces. A ray that is `at_lens` does not see the back of the surface that the
+    /// camera is on. A cut-out after n others uses `random(n)`.
+    #[inline]
+    pub(crate) fn stop(
+        &self,
+        origin: &mut Origin,
+        (ray, hit, point): (&Ray, &Hit, &SurfacePoint),
+        at_lens: bool,
+        random: impl FnOnce(u32) -> f32,
+        counters: &mut Counters,
+    ) -> Result<(), Option<Ray>> {
+        let Origin { triangle, crossings } = *origin;
+        let is_passed =
+            at_lens && point.is_left_by(ray) || self.is_skipped(point, hit, triangle, || random(crossings));
+        if !is_passed {
+            return Ok(());
+        }
+        if crossings >= MAX_CROSSINGS {
+            counters.dropped.unfinished += 1;
+            return Err(None);
+        }
+        *origin = Origin { triangle: hit.triangle, crossings: crossings + 1 };
+        Err(Some(point.spawn(ray.direction.into())))
     }
 
     /// Opacity at `point`: 1 unless its material is a cut-out.
     #[inline]
-    pub(in crate::transport) fn opacity_at(&self, point: &SurfacePoint) -> f32 {
+    pub(crate) fn opacity_at(&self, point: &SurfacePoint) -> f32 {
         if F::CUTOUT { point.material.opacity.at::<F>(self.scene, point.uv).min(1.0) } else { 1.0 }
     }
 
     /// Follows `segment` to the next scattering surface; a cut-out after n surfaces uses `random(n)`. `None`
     /// if the ray leaves the scene or skips more than [`MAX_CROSSINGS`] surfaces.
-    pub(in crate::transport) fn next_surface(
+    pub(crate) fn next_surface(
         &self,
         segment: &mut Segment,
         random: impl Fn(u32) -> f32,
@@ -137,7 +174,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     }
 
     /// [`Self::next_surface`] of a segment whose ray was already traced, with result `hit`.
-    pub(in crate::transport) fn surface_from(
+    pub(crate) fn surface_from(
         &self,
         mut hit: Hit,
         segment: &mut Segment,

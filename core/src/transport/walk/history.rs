@@ -41,7 +41,7 @@ impl Rest {
     pub const SETS: u32 = 16;
 
     /// Light that records or light samples supply.
-    pub(in crate::transport) const NONE: Self = Self(0);
+    pub(crate) const NONE: Self = Self(0);
     const BESIDE_IRRADIANCE: u32 = 1;
     const BESIDE_LOBES: u32 = 2;
     /// Photons supply the light; photons beside records, too.
@@ -51,12 +51,12 @@ impl Rest {
     const SEEN: Self = Self(Self::BY_PHOTONS_BESIDE_RECORDS);
 
     /// Set number `bits`, modulo [`Rest::SETS`].
-    pub(in crate::transport) fn from_bits(bits: u32) -> Self {
+    pub(crate) fn from_bits(bits: u32) -> Self {
         Self(bits % Self::SETS)
     }
 
     /// Number of the set, below [`Rest::SETS`].
-    pub(in crate::transport) fn bits(self) -> u32 {
+    pub(crate) fn bits(self) -> u32 {
         self.0
     }
 
@@ -90,7 +90,7 @@ impl Rest {
 /// Set of properties of the vertices so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub(in crate::transport) struct History(u32);
+pub(crate) struct History(u32);
 
 impl History {
     fn has(self, property: u32) -> bool {
@@ -121,19 +121,19 @@ impl History {
     }
 
     /// Camera subpath with a vertex at `bsdf`.
-    pub(in crate::transport) fn on_camera_path(self, bsdf: &Bsdf) -> Self {
+    pub(crate) fn on_camera_path(self, bsdf: &Bsdf) -> Self {
         let is_cast = bsdf.is_caustic_caster() && (self.has(LAST_RECEIVES) || self.has(BY_CASTERS));
         let next = self.with(bsdf, self.of_last());
         Self(next.0 | if is_cast { BY_CASTERS } else { 0 })
     }
 
     /// Camera subpath that left its last vertex by a specular coat.
-    pub(in crate::transport) fn by_coat(self) -> Self {
+    pub(crate) fn by_coat(self) -> Self {
         Self(self.0 & !(LAST_HAS_BASE | LAST_IS_ROUGH | LAST_RECEIVES))
     }
 
     /// Light subpath with a vertex at `bsdf`.
-    pub(in crate::transport) fn on_light_path(self, bsdf: &Bsdf) -> Self {
+    pub(crate) fn on_light_path(self, bsdf: &Bsdf) -> Self {
         let next = self.with(bsdf, 0);
         let of_last = if self.has(LAST_IS_ROUGH) { next.of_last() } else { 0 };
         let by_casters = match (self.has(HAS_RECEIVER), bsdf.is_caustic_caster()) {
@@ -155,12 +155,12 @@ impl History {
     }
 
     /// Rest of the light of a light subpath.
-    pub(in crate::transport) fn rest(self) -> Rest {
+    pub(crate) fn rest(self) -> Rest {
         self.rest_of(self.has(IS_CAUSTIC))
     }
 
     /// Rest of the light of merges at the last vertex of a camera subpath. Their photons may be caustic.
-    pub(in crate::transport) fn rest_of_merge(self) -> Rest {
+    pub(crate) fn rest_of_merge(self) -> Rest {
         Rest(self.rest_of(true).0 | Rest::BY_PHOTONS_BESIDE_RECORDS)
     }
 
@@ -170,7 +170,7 @@ impl History {
     }
 
     /// Rest of the light of an emitter that the last ray of a camera subpath hits.
-    pub(in crate::transport) fn rest_of_hit(self) -> Rest {
+    pub(crate) fn rest_of_hit(self) -> Rest {
         let is_direct = !self.has(HAS_TWO) && self.has(LAST_IS_ROUGH);
         match self.has(HAS_ROUGH) {
             false => Rest::SEEN,
@@ -180,13 +180,13 @@ impl History {
     }
 
     /// Rest of the light of a light sample at the last vertex of a camera subpath.
-    pub(in crate::transport) fn rest_of_sample(self) -> Rest {
+    pub(crate) fn rest_of_sample(self) -> Rest {
         if self.has(HAS_TWO) { self.rest_of_emission() } else { Rest::NONE }
     }
 
     /// Rest of the light of a connection of the last vertex with the end of a light subpath that has its own
     /// rest.
-    pub(in crate::transport) fn rest_of_connection(self, of_light: Rest) -> Rest {
+    pub(crate) fn rest_of_connection(self, of_light: Rest) -> Rest {
         let beside_records = Rest::without(self.0 | self.of_last()).0 & of_light.0;
         Rest(beside_records | of_light.0 & Rest::BY_PHOTONS)
     }

@@ -14,13 +14,13 @@ use crate::photon::Photon;
 use crate::sampling::{Numbers, Sampler, mix};
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
-use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::context::{Origin, SceneContext};
 use crate::transport::walk::dimension;
 use crate::transport::walk::history::History;
 use crate::transport::walk::light_lanes::{LOBE, Lanes, ROULETTE, SCATTERING};
 use crate::transport::walk::shading_normal::{is_bent, sample_bent};
 use crate::transport::walk::sums::Sums;
-use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
+use crate::transport::walk::termination::{is_cut, survival_limit};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use halflight_simd::kernels::shade::BLOCK;
@@ -33,7 +33,7 @@ pub const PATHS_PER_TASK: usize = 1024;
 pub const VERTICES_PER_TASK: usize = 6 * PATHS_PER_TASK;
 
 /// Maximum continuation probability of a path that stores its vertices.
-pub(in crate::transport) const MAX_CONTINUATION: f32 = 0.8;
+pub(crate) const MAX_CONTINUATION: f32 = 0.8;
 
 /// Dimension of the sampler at a vertex for the visitor.
 const VISITOR: u32 = 3;
@@ -41,16 +41,13 @@ const VISITOR: u32 = 3;
 /// State of one light subpath between two vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct LightPathState {
+pub(crate) struct LightPathState {
     pub power: [f32; 3],
     /// Index of the path in its map.
     pub number: u32,
     /// Segments traced, including the current one.
     pub segments: u32,
-    /// Number of skipped surfaces.
-    crossings: u32,
-    /// Triangle at the origin of the ray, which the ray cannot hit again.
-    triangle: u32,
+    start: Origin,
     /// Index of the light, and below the position of emission.
     pub light: u32,
     pub origin: [f32; 3],
@@ -74,7 +71,7 @@ pub(in crate::transport) struct LightPathState {
 }
 
 /// Vertex of a light subpath.
-pub(in crate::transport) struct Vertex<'v> {
+pub(crate) struct Vertex<'v> {
     pub point: &'v SurfacePoint<'v>,
     pub bsdf: &'v Bsdf,
     /// Barycentric coordinates of the second and third corner of the triangle.
@@ -90,18 +87,18 @@ pub(in crate::transport) struct Vertex<'v> {
 
 impl Vertex<'_> {
     /// Random number of the visitor.
-    pub(in crate::transport) fn visitor_number(&self) -> f32 {
+    pub(crate) fn visitor_number(&self) -> f32 {
         self.numbers.single(self.first + VISITOR)
     }
 
     /// Two random numbers of the visitor.
-    pub(in crate::transport) fn visitor_pair(&self) -> [f32; 2] {
+    pub(crate) fn visitor_pair(&self) -> [f32; 2] {
         self.numbers.pair(self.first + VISITOR)
     }
 
     /// Photon of light that arrives with `power`. A camera path at a cut-out sees the light on its solid
     /// part; photons carry only the fraction opacity of it, hence the division.
-    pub(in crate::transport) fn photon(&self, power: Rgb) -> Photon {
+    pub(crate) fn photon(&self, power: Rgb) -> Photon {
         let power = power / self.opacity;
         Photon::new(self.point.position, self.to_light, self.point.geometric_normal, power)
     }
@@ -109,7 +106,7 @@ impl Vertex<'_> {
 
 /// Continuation of a path behind a vertex.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::transport) struct Continuation {
+pub(crate) struct Continuation {
     /// Upper bound of the continuation probability.
     pub most: f32,
     /// True if the path survives only if it scatters by a delta function or by a coat alone.
@@ -117,7 +114,7 @@ pub(in crate::transport) struct Continuation {
 }
 
 /// Action of a method at the vertices of light subpaths.
-pub(in crate::transport) trait Visitor {
+pub(crate) trait Visitor {
     /// Number of dimensions of the sampler at a vertex.
     const DIMENSIONS: u32 = 3;
     /// Seed that separates these random numbers from those of other visitors and of pixels.
@@ -158,7 +155,7 @@ pub(in crate::transport) trait Visitor {
 
 /// Random walk of all light subpaths of a map, without its visitor.
 #[derive(Clone, Copy)]
-pub(in crate::transport) struct LightWalk<'a, F> {
+pub(crate) struct LightWalk<'a, F> {
     pub context: SceneContext<'a, F>,
     pub emission: &'a EmissionSampler<'a>,
     pub seed: u32,
@@ -169,12 +166,12 @@ pub(in crate::transport) struct LightWalk<'a, F> {
 
 impl<'a, F: Features> LightWalk<'a, F> {
     /// Number of tasks of a map.
-    pub(in crate::transport) fn tasks(&self) -> usize {
+    pub(crate) fn tasks(&self) -> usize {
         (self.paths as usize).div_ceil(PATHS_PER_TASK)
     }
 
     /// Scratch memory of one task.
-    pub(in crate::transport) fn scratch() -> Footprint {
+    pub(crate) fn scratch() -> Footprint {
         Footprint::default()
             .slice::<LightPathState>(PATHS_PER_TASK)
             .slice::<Ray>(PATHS_PER_TASK)
@@ -182,7 +179,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
     }
 
     /// Follows the paths of task `task` of map `map`.
-    pub(in crate::transport) fn follow<V: Visitor>(
+    pub(crate) fn follow<V: Visitor>(
         &self,
         task: usize,
         map: u32,
@@ -210,7 +207,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
                     power: (emitted.power / self.paths as f32).to_array(),
                     number,
                     segments: 1,
-                    triangle: emitted.triangle,
+                    start: Origin { triangle: emitted.triangle, crossings: 0 },
                     light: emitted.light,
                     cell: emitted.cell,
                     origin: emitted.ray.origin,
@@ -293,15 +290,11 @@ impl<'a, F: Features> LightWalk<'a, F> {
         let met = lanes.block.points.at(i);
         let point = met.point()?;
         let direction = Vec3::from(ray.direction);
-        let opacity = || numbers.single(dimension::opacity(state.segments, state.crossings));
-        if self.context.is_skipped(&point, hit, state.triangle, opacity) {
-            if state.crossings >= MAX_CROSSINGS {
-                counters.dropped.unfinished += 1;
-                return None;
-            }
-            state.crossings += 1;
-            state.triangle = hit.triangle;
-            return Some(point.spawn(direction));
+        let segments = state.segments;
+        let opacity = |crossings| numbers.single(dimension::opacity(segments, crossings));
+        let end = (ray, hit, &point);
+        if let Err(behind) = self.context.stop(&mut state.start, end, false, opacity, counters) {
+            return behind;
         }
         if state.segments >= self.max_depth {
             return None;
@@ -358,7 +351,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
         }
         state.power = (next / continuation_probability).to_array();
         state.segments += 1;
-        state.triangle = hit.triangle;
+        state.start.triangle = hit.triangle;
         state.survived *= continuation_probability;
         Some(point.spawn(towards))
     }
@@ -367,7 +360,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
 /// The `power` of a light path that comes along `direction`, `from` in the frame, and is scattered `towards`.
 /// Unlike radiance, power is not scaled by refraction; with a shading normal, the other cosine counts (Veach
 /// 1997, sections 5.2 and 5.3).
-fn scattered(
+pub(crate) fn scattered(
     power: Rgb,
     point: &SurfacePoint,
     (direction, from): (Vec3, Vec3),

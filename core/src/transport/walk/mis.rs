@@ -15,12 +15,13 @@ use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::light::LightSampler;
 use crate::scene::SurfacePoint;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::vertex::Scatterer;
 use glam::Vec3;
 
 /// Power heuristic (Veach and Guibas 1995, section 4.1): weight of a sample of pdf `own` beside a technique
 /// of pdf `other`. One of the two may be zero.
 #[inline]
-pub(in crate::transport) fn power_heuristic(own: f32, other: f32) -> f32 {
+pub(crate) fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)
 }
@@ -28,61 +29,56 @@ pub(in crate::transport) fn power_heuristic(own: f32, other: f32) -> f32 {
 /// Weight of a sample of the environment. With environment visibility the balance heuristic: visibility is
 /// learned per place, not per point, so the pdf is uncertain and its square would trust it too much.
 #[inline]
-pub(in crate::transport) fn environment_heuristic(lights: &LightSampler, own: f32, other: f32) -> f32 {
+pub(crate) fn environment_heuristic(lights: &LightSampler, own: f32, other: f32) -> f32 {
     if lights.has_visibility() { 1.0 / (1.0 + other / own) } else { power_heuristic(own, other) }
 }
 
 /// Weight of a contribution of path tracing that vertex merging can sample as well: `weight` is its weight
 /// among the techniques of path tracing, `ratio` the pdf of merging over the pdf of path tracing.
 #[inline]
-pub(in crate::transport) fn weight_beside_merging(weight: f32, ratio: f32) -> f32 {
+pub(crate) fn weight_beside_merging(weight: f32, ratio: f32) -> f32 {
     weight / (1.0 + weight * ratio * ratio)
 }
 
 /// Weight of a photon; `ratio` is the pdf of path tracing over the pdf of vertex merging.
 #[inline]
-pub(in crate::transport) fn merging_weight(ratio: f32) -> f32 {
+pub(crate) fn merging_weight(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
 /// Vertex of a specular chain: light arrives from `far`, towards the light, and leaves to `near`, towards the
 /// camera.
-pub(in crate::transport) struct ChainLink<'p> {
-    pub(in crate::transport) point: &'p SurfacePoint<'p>,
+pub(crate) struct ChainLink<'p> {
+    pub(crate) point: &'p SurfacePoint<'p>,
     /// BSDF seen from the side of `near`.
-    pub(in crate::transport) bsdf: &'p Bsdf,
+    pub(crate) bsdf: &'p Bsdf,
     /// Local direction on the side of the BSDF.
-    pub(in crate::transport) near: Vec3,
-    pub(in crate::transport) far: Vec3,
+    pub(crate) near: Vec3,
+    pub(crate) far: Vec3,
     /// True if only the coat scatters.
-    pub(in crate::transport) coat_alone: bool,
+    pub(crate) coat_alone: bool,
 }
 
 impl ChainLink<'_> {
     /// Pdf of scattering from `far` to `near`, times cos(far) / cos(near). Divided by the pdf of the other
     /// direction it is ρ.
-    pub(in crate::transport) fn reverse<F: Features>(&self, context: &SceneContext<F>) -> f32 {
+    pub(crate) fn reverse<F: Features>(&self, context: &SceneContext<F>) -> f32 {
         self.pdf(context) * (self.far.z / self.near.z).abs()
     }
 
     /// Pdf of scattering from `far` to `near`.
-    pub(in crate::transport) fn pdf<F: Features>(&self, context: &SceneContext<F>) -> f32 {
+    pub(crate) fn pdf<F: Features>(&self, context: &SceneContext<F>) -> f32 {
         let Self { point, bsdf, near, far, coat_alone } = *self;
         if F::GLOSSY && coat_alone {
             return bsdf.evaluate_apart::<F>(far, near, 1.0)[1].1;
         }
-        if far.z > 0.0 {
-            return bsdf.evaluate::<F>(far, near).1;
-        }
-        let turned = |way: Vec3| Vec3::new(way.x, way.y, -way.z);
-        let behind = Bsdf::at::<F>(context.scene, point.material, point.uv, !point.front);
-        behind.evaluate::<F>(turned(far), turned(near)).1
+        Scatterer { point, bsdf }.reverse_pdf(context, near, far)
     }
 }
 
 /// R of a camera path behind a specular vertex that it left by `sample`: R so far times ρ.
 #[inline]
-pub(in crate::transport) fn ratio_behind<F: Features>(
+pub(crate) fn ratio_behind<F: Features>(
     ratio: f32,
     link: &ChainLink,
     sample: &BsdfSample,

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 /// Set of classes that a path still has to find behind its ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub(in crate::transport) struct PathClasses(u32);
+pub(crate) struct PathClasses(u32);
 
 /// Emission of surfaces.
 const EMISSION: u32 = 1;
@@ -26,24 +26,23 @@ const BEHIND_SPECULAR: u32 = 1 << 6;
 
 impl PathClasses {
     /// All light.
-    pub(in crate::transport) const ALL: Self = Self(EMISSION | ENVIRONMENT | SPECULAR | ROUGH | CAUSTIC);
+    pub(crate) const ALL: Self = Self(EMISSION | ENVIRONMENT | SPECULAR | ROUGH | CAUSTIC);
     /// Light of emitters, direct or by specular surfaces; the irradiance cache supplies the rest.
-    pub(in crate::transport) const DIRECT: Self = Self(Self::ALL.0 & !ROUGH);
+    pub(crate) const DIRECT: Self = Self(Self::ALL.0 & !ROUGH);
     /// Light that non-specular surfaces reflect: gather rays of a record find it.
-    pub(in crate::transport) const REFLECTED: Self = Self(ROUGH | GATHERED);
+    pub(crate) const REFLECTED: Self = Self(ROUGH | GATHERED);
     /// Light directly from emitters; photons supply the rest.
-    pub(in crate::transport) const EMITTED: Self = Self(EMISSION | ENVIRONMENT);
+    pub(crate) const EMITTED: Self = Self(EMISSION | ENVIRONMENT);
     /// All light except caustics, with photon maps: the path may end at the next surface with a diffuse part.
-    pub(in crate::transport) const NO_CAUSTIC: Self = Self(Self::ALL.0 & !CAUSTIC | GATHERED);
+    pub(crate) const NO_CAUSTIC: Self = Self(Self::ALL.0 & !CAUSTIC | GATHERED);
     /// [`Self::NO_CAUSTIC`] behind a specular surface, where light of emitters is a caustic.
-    pub(in crate::transport) const BEHIND_MIRROR: Self = Self(SPECULAR | ROUGH | GATHERED);
+    pub(crate) const BEHIND_MIRROR: Self = Self(SPECULAR | ROUGH | GATHERED);
     /// All light, with photon maps: the path may end at the next surface with a diffuse part.
-    pub(in crate::transport) const GATHERED: Self = Self(Self::ALL.0 | GATHERED);
+    pub(crate) const GATHERED: Self = Self(Self::ALL.0 | GATHERED);
     /// All light except the emission of the lamp on a camera ray, for which the pixel has separate rays.
-    pub(in crate::transport) const WITHOUT_EMISSION: Self = Self(Self::ALL.0 & !EMISSION);
+    pub(crate) const WITHOUT_EMISSION: Self = Self(Self::ALL.0 & !EMISSION);
     /// All light except emitters that the camera sees, directly or by specular surfaces.
-    pub(in crate::transport) const WITHOUT_VISIBLE_EMITTERS: Self =
-        Self(SPECULAR | ROUGH | CAUSTIC | BEHIND_SPECULAR);
+    pub(crate) const WITHOUT_VISIBLE_EMITTERS: Self = Self(SPECULAR | ROUGH | CAUSTIC | BEHIND_SPECULAR);
 
     #[inline]
     const fn has(self, class: u32) -> bool {
@@ -52,49 +51,49 @@ impl PathClasses {
 
     /// Intersection of both sets.
     #[inline]
-    pub(in crate::transport) const fn and(self, other: Self) -> Self {
+    pub(crate) const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
     /// True if the path ends at `bsdf`, because the set holds no light that `bsdf` reflects or transmits.
     #[inline]
-    pub(in crate::transport) fn ends_at(self, bsdf: &Bsdf) -> bool {
+    pub(crate) fn ends_at(self, bsdf: &Bsdf) -> bool {
         !self.has(if bsdf.is_delta() { SPECULAR } else { ROUGH })
     }
 
     /// True if the set holds light that non-specular surfaces reflect.
     #[inline]
-    pub(in crate::transport) fn has_rough(self) -> bool {
+    pub(crate) fn has_rough(self) -> bool {
         self.has(ROUGH)
     }
 
     /// Classes to find behind `bsdf`, at which no estimator supplies light.
     #[inline]
-    pub(in crate::transport) fn behind(self, bsdf: &Bsdf) -> Self {
+    pub(crate) fn behind(self, bsdf: &Bsdf) -> Self {
         if self.has(BEHIND_SPECULAR) && bsdf.is_delta() { self } else { Self::ALL }
     }
 
     /// True if the set holds light of the environment.
     #[inline]
-    pub(in crate::transport) fn has_environment(self) -> bool {
+    pub(crate) fn has_environment(self) -> bool {
         self.has(ENVIRONMENT)
     }
 
     /// True if the set holds emission of surfaces.
     #[inline]
-    pub(in crate::transport) fn has_emission(self) -> bool {
+    pub(crate) fn has_emission(self) -> bool {
         self.has(EMISSION)
     }
 
     /// True if photons supply the caustics.
     #[inline]
-    pub(in crate::transport) fn excludes_caustics(self) -> bool {
+    pub(crate) fn excludes_caustics(self) -> bool {
         self == Self::NO_CAUSTIC || self == Self::BEHIND_MIRROR
     }
 
     /// True if the path may end in a photon map.
     #[inline]
-    pub(in crate::transport) fn may_end_in_photon_map(self) -> bool {
+    pub(crate) fn may_end_in_photon_map(self) -> bool {
         self.has(GATHERED)
     }
 }

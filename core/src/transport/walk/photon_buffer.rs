@@ -5,17 +5,17 @@ use crate::sampling::mix;
 use crate::transport::settings::Counters;
 
 /// Photon memory of a task.
-pub(in crate::transport) struct PhotonBuffer<'p> {
+pub(crate) struct PhotonBuffer<'p> {
     photons: &'p mut [Photon],
     count: usize,
 }
 
 impl<'p> PhotonBuffer<'p> {
-    pub(in crate::transport) fn new(photons: &'p mut [Photon]) -> Self {
+    pub(crate) fn new(photons: &'p mut [Photon]) -> Self {
         Self { photons, count: 0 }
     }
 
-    pub(in crate::transport) fn push(&mut self, photon: Photon, counters: &mut Counters) {
+    pub(crate) fn push(&mut self, photon: Photon, counters: &mut Counters) {
         match self.photons.get_mut(self.count) {
             Some(slot) => {
                 *slot = photon;
@@ -38,7 +38,7 @@ impl<'p> PhotonBuffer<'p> {
     }
 
     /// Fills the rest with photons without position, which a map rejects.
-    pub(in crate::transport) fn finish(self) {
+    pub(crate) fn finish(self) {
         let Self { photons, count } = self;
         if let Some(rest) = photons.get_mut(count..) {
             rest.fill(Photon::NONE);
@@ -55,7 +55,7 @@ const STEP: f32 = 0.875;
 /// A random sample of all photons of a task, as large as its memory: each is kept with the same probability,
 /// and its power is divided by it. The probability depends on the number of photons alone, so that the
 /// sample has no bias; photons of long paths have the power of others.
-pub(in crate::transport) struct PhotonSample<'p> {
+pub(crate) struct PhotonSample<'p> {
     buffer: PhotonBuffer<'p>,
     /// Photons so far, and the fraction that is kept.
     count: u32,
@@ -63,11 +63,11 @@ pub(in crate::transport) struct PhotonSample<'p> {
 }
 
 impl<'p> PhotonSample<'p> {
-    pub(in crate::transport) fn new(photons: &'p mut [Photon]) -> Self {
+    pub(crate) fn new(photons: &'p mut [Photon]) -> Self {
         Self { buffer: PhotonBuffer::new(photons), count: 0, fraction: 1.0 }
     }
 
-    pub(in crate::transport) fn push(&mut self, photon: Photon, counters: &mut Counters) {
+    pub(crate) fn push(&mut self, photon: Photon, counters: &mut Counters) {
         self.count += 1;
         let most = FULL * self.buffer.photons.len() as f32;
         if self.count as f32 * self.fraction > most {
@@ -81,7 +81,7 @@ impl<'p> PhotonSample<'p> {
     }
 
     /// Divides powers, and fills the rest with photons without position.
-    pub(in crate::transport) fn finish(mut self) {
+    pub(crate) fn finish(mut self) {
         if self.fraction < 1.0 {
             let PhotonBuffer { photons, count } = &mut self.buffer;
             for photon in photons.iter_mut().take(*count) {

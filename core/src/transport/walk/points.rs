@@ -14,27 +14,27 @@ use halflight_simd::kernels::shade::texture::TextureBlock;
 use halflight_simd::kernels::shade::{BLOCK, Row, Row3, at, put};
 
 /// Surface points of a block. Rows of other hits keep old values.
-pub(in crate::transport) struct PointBlock<'a> {
+pub(crate) struct PointBlock<'a> {
     corners: [Row3; 3],
     normals: [Row3; 3],
     weights: [Row; 2],
-    pub(in crate::transport) surface: SurfaceBlock,
-    pub(in crate::transport) triangle: [u32; BLOCK],
-    pub(in crate::transport) material: [&'a Material; BLOCK],
+    pub(crate) surface: SurfaceBlock,
+    pub(crate) triangle: [u32; BLOCK],
+    pub(crate) material: [&'a Material; BLOCK],
     uv: [Vec2; BLOCK],
     textures: TextureBlock,
     /// Set of hits whose colours were looked up in lanes, and their texels.
     textured: u32,
     texel: Row3,
     /// Set of hits with a point, by [`PointBlock::meet`].
-    pub(in crate::transport) met: u32,
+    pub(crate) met: u32,
 }
 
 static GREY: Material = Material::GREY;
 
 impl<'a> PointBlock<'a> {
     /// Without points.
-    pub(in crate::transport) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             corners: [[[0.0; BLOCK]; 3]; 3],
             normals: [[[0.0; BLOCK]; 3]; 3],
@@ -52,7 +52,7 @@ impl<'a> PointBlock<'a> {
 
     /// Collects the triangle of `hit` as number `i`. False if the scene has no such triangle.
     #[inline]
-    pub(in crate::transport) fn gather(&mut self, scene: &Scene<'a>, i: usize, hit: &Hit) -> bool {
+    pub(crate) fn gather(&mut self, scene: &Scene<'a>, i: usize, hit: &Hit) -> bool {
         let (mesh, i) = (&scene.mesh, i & 15);
         let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
         let Some(material) = scene.materials.get(triangle.material as usize) else { return false };
@@ -75,7 +75,7 @@ impl<'a> PointBlock<'a> {
 
     /// Computes the points of the `hits` of `rays`, at most sixteen.
     #[inline]
-    pub(in crate::transport) fn meet<F: Features>(
+    pub(crate) fn meet<F: Features>(
         &mut self,
         context: &SceneContext<'a, F>,
         (rays, hits): (&[Ray], &[Hit]),
@@ -90,11 +90,31 @@ impl<'a> PointBlock<'a> {
     /// Computes the points of the gathered set `met` of `hits` of `rays`, at most sixteen. Returns the set of
     /// hits with a point.
     #[inline]
-    pub(in crate::transport) fn compute<F: Features>(
+    pub(crate) fn compute<F: Features>(
         &mut self,
         context: &SceneContext<'a, F>,
         (rays, hits): (&[Ray], &[Hit]),
         mut met: u32,
+    ) -> u32 {
+        self.textured = 0;
+        let special = if context.has_lanes() { self.compute_in_lanes(context, rays, met) } else { met };
+        for i in Set(special) {
+            let (Some(ray), Some(hit)) = (rays.get(i), hits.get(i)) else { continue };
+            match context.surface_at(ray, hit) {
+                Some(point) => self.put_point(i, &point, Vec3::from(ray.direction)),
+                None => met &= !(1 << i),
+            }
+        }
+        met
+    }
+
+    /// Computes the points of `met` in lanes. Returns the set of those that have to be computed one by one.
+    #[inline]
+    fn compute_in_lanes<F: Features>(
+        &mut self,
+        context: &SceneContext<'a, F>,
+        rays: &[Ray],
+        met: u32,
     ) -> u32 {
         let scene = context.scene;
         let mut copies = [Ray::zeroed(); BLOCK];
@@ -105,7 +125,7 @@ impl<'a> PointBlock<'a> {
             rays
         };
         let records: &[[f32; 8]] = bytemuck::cast_slice(whole);
-        let Some(records) = records.first_chunk() else { return 0 };
+        let Some(records) = records.first_chunk() else { return met };
         let surfaces = Surfaces {
             corners: &self.corners,
             normals: (!scene.mesh.normals.is_empty()).then_some(&self.normals),
@@ -128,21 +148,13 @@ impl<'a> PointBlock<'a> {
             let mapped = |i: &usize| self.material[*i].normal_map.is_some();
             special |= Set(met).filter(mapped).fold(0, |set, i| set | 1 << i);
         }
-        for i in Set(special) {
-            let (Some(ray), Some(hit)) = (rays.get(i), hits.get(i)) else { continue };
-            match context.surface_at(ray, hit) {
-                Some(point) => self.put_point(i, &point, Vec3::from(ray.direction)),
-                None => met &= !(1 << i),
-            }
-        }
-        met
+        special
     }
 
     /// Looks up the textures of the colours at the hits `met`. Their accesses to memory overlap.
     #[inline]
     fn look_up_colors<F: Features>(&mut self, context: &SceneContext<'a, F>, met: u32) {
         let scene = context.scene;
-        self.textured = 0;
         let mut texels: [(&[[u8; 4]], usize); BLOCK] = [(&[], 0); BLOCK];
         for i in Set(met) {
             let id = self.material[i].surface.color().and_then(|color| color.texture);
@@ -171,11 +183,12 @@ impl<'a> PointBlock<'a> {
         }
         put(&mut surface.wo, i, point.frame.to_local(-direction).to_array());
         surface.front = surface.front & !(1 << i) | u32::from(point.front) << i;
+        self.uv[i & 15] = point.uv;
     }
 
     /// Surface point of hit `i`.
     #[inline]
-    pub(in crate::transport) fn point(&self, i: usize) -> SurfacePoint<'a> {
+    pub(crate) fn point(&self, i: usize) -> SurfacePoint<'a> {
         let i = i & 15;
         let Self { surface, .. } = self;
         let [tangent, bitangent, normal] = &surface.frame;
@@ -197,19 +210,19 @@ impl<'a> PointBlock<'a> {
 
     /// True if the viewer of hit `i` is on the front.
     #[inline]
-    pub(in crate::transport) fn is_front(&self, i: usize) -> bool {
+    pub(crate) fn is_front(&self, i: usize) -> bool {
         self.surface.front >> (i & 15) & 1 == 1
     }
 
     /// Hit `i` of the block.
     #[inline]
-    pub(in crate::transport) fn at(&self, i: usize) -> Met<'_, 'a> {
+    pub(crate) fn at(&self, i: usize) -> Met<'_, 'a> {
         Met { points: self, i: i & 15 }
     }
 
     /// BSDF at hit `i`.
     #[inline]
-    pub(in crate::transport) fn bsdf<F: Features>(&self, scene: &Scene, i: usize) -> Bsdf {
+    pub(crate) fn bsdf<F: Features>(&self, scene: &Scene, i: usize) -> Bsdf {
         let i = i & 15;
         let texel = (F::TEXTURES && self.textured >> i & 1 == 1).then(|| Rgb::from(at(&self.texel, i)));
         Bsdf::of_texel::<F>((scene, self.material[i]), texel, self.uv[i], self.is_front(i))
@@ -218,7 +231,7 @@ impl<'a> PointBlock<'a> {
 
 /// Hit of a block.
 #[derive(Clone, Copy)]
-pub(in crate::transport) struct Met<'p, 'a> {
+pub(crate) struct Met<'p, 'a> {
     points: &'p PointBlock<'a>,
     i: usize,
 }
@@ -226,20 +239,20 @@ pub(in crate::transport) struct Met<'p, 'a> {
 impl<'a> Met<'_, 'a> {
     /// Its surface point, if there is one.
     #[inline]
-    pub(in crate::transport) fn point(&self) -> Option<SurfacePoint<'a>> {
+    pub(crate) fn point(&self) -> Option<SurfacePoint<'a>> {
         (self.points.met >> self.i & 1 == 1).then(|| self.points.point(self.i))
     }
 
     /// BSDF at the point.
     #[inline]
-    pub(in crate::transport) fn bsdf<F: Features>(&self, scene: &Scene) -> Bsdf {
+    pub(crate) fn bsdf<F: Features>(&self, scene: &Scene) -> Bsdf {
         self.points.bsdf::<F>(scene, self.i)
     }
 }
 
 /// Set of hits of a block.
 #[derive(Clone, Copy)]
-pub(in crate::transport) struct Set(pub(in crate::transport) u32);
+pub(crate) struct Set(pub(crate) u32);
 
 impl Iterator for Set {
     type Item = usize;
@@ -255,7 +268,7 @@ impl Iterator for Set {
 impl Set {
     /// Hits whose number in `row` has the property `is`.
     #[inline(always)]
-    pub(in crate::transport) fn of(row: &[u32; BLOCK], is: impl Fn(u32) -> bool) -> u32 {
+    pub(crate) fn of(row: &[u32; BLOCK], is: impl Fn(u32) -> bool) -> u32 {
         let mut set = 0;
         for (i, value) in row.iter().enumerate() {
             set |= u32::from(is(*value)) << i;

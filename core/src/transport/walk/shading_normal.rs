@@ -14,7 +14,7 @@ use crate::transport::walk::context::SceneContext;
 use glam::Vec3;
 
 /// True if the shading normal at `point` is not that of the triangle, and all lobes of `bsdf` have a width
-/// and reflect. line]
+/// and reflect.
 pub(super) fn is_bent(point: &SurfacePoint, bsdf: &Bsdf) -> bool {
     point.frame.normal != point.geometric_normal
         && match bsdf {

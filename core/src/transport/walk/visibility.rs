@@ -5,7 +5,9 @@ use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::geometry::{Hit, Ray};
 use crate::light::LightSample;
+use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::SurfacePoint;
+use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use glam::Vec3;
@@ -18,20 +20,75 @@ const BEFORE_LAMP: f32 = 1.0 - 4.0 * f32::EPSILON;
 /// Number of rays below which rays are traced one by one, since a batch has a setup cost.
 const FEW: usize = 32;
 
-/// Shadow rays that are traced together, and working memory for them.
-pub(in crate::transport) struct ShadowRays<'w> {
-    pub(in crate::transport) rays: &'w mut [Ray],
+/// Queue of shadow rays that are traced together, and working memory for them.
+pub(crate) struct ShadowRays<'w> {
+    pub(crate) rays: &'w mut [Ray],
     /// Unoccluded contribution of each ray.
-    pub(in crate::transport) light: &'w mut [[f32; 3]],
-    pub(in crate::transport) hits: &'w mut [Hit],
-    pub(in crate::transport) hidden: &'w mut [u8],
+    pub(crate) light: &'w mut [[f32; 3]],
+    hits: &'w mut [Hit],
+    hidden: &'w mut [u8],
+    /// Number of rays.
+    pub(crate) count: usize,
+}
+
+impl<'w> ShadowRays<'w> {
+    /// Memory of a queue of `capacity` rays.
+    pub(crate) fn footprint(capacity: usize) -> Footprint {
+        let rays = Footprint::default().slice::<Ray>(capacity).slice::<[f32; 3]>(capacity);
+        rays.slice::<Hit>(capacity).slice::<u8>(capacity)
+    }
+
+    /// An empty queue.
+    pub(crate) fn new(capacity: usize, arena: &mut Arena<'w>) -> Result<Self, OutOfMemory> {
+        Ok(Self {
+            rays: arena.slice(capacity)?,
+            light: arena.slice(capacity)?,
+            hits: arena.slice(capacity)?,
+            hidden: arena.slice(capacity)?,
+            count: 0,
+        })
+    }
+
+    /// Queues `ray` with its contribution `light`, if there is room.
+    #[inline]
+    pub(crate) fn push(&mut self, ray: Ray, light: Rgb) {
+        let slots = (self.rays.get_mut(self.count), self.light.get_mut(self.count));
+        if let (Some(slot), Some(contribution)) = slots {
+            (*slot, *contribution) = (ray, light.to_array());
+            self.count += 1;
+        }
+    }
+
+    /// Traces the queue and empties it. `arrive` gets each ray that reaches its light, and the transmitted
+    /// light. Rays that hit too many cut-outs are counted as unfinished.
+    pub(crate) fn trace<F: Features>(
+        &mut self,
+        context: &SceneContext<F>,
+        counters: &mut Counters,
+        mut arrive: impl FnMut(&Ray, Rgb),
+    ) {
+        let count = core::mem::take(&mut self.count);
+        let traced = &mut counters.shadow_rays;
+        if context.has_cutouts {
+            counters.dropped.unfinished += context.trace_through_cutouts(self, count, traced, arrive);
+            return;
+        }
+        *traced += count as u64;
+        let (rays, hidden) = (&self.rays[..count], &mut self.hidden[..count]);
+        context.bvh.occluded_batch(context.level, rays, hidden);
+        for ((ray, light), hidden) in rays.iter().zip(&*self.light).zip(&*hidden) {
+            if *hidden == 0 {
+                arrive(ray, Rgb::from(*light));
+            }
+        }
+    }
 }
 
 impl<F: Features> SceneContext<'_, F> {
     /// Shadow ray from `point` to the light of `sample`, which hits neither end. `None` if the offset light
     /// point is on the other side of the surface: rounding may put a `point` on the light behind it.
     #[inline]
-    pub(in crate::transport) fn shadow_ray(&self, point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
+    pub(crate) fn shadow_ray(&self, point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
         if let Some(target) = sample.target {
             // Offset from the light's surface, to the side of `point`.
             let end = target.position + target.error * target.normal;
@@ -49,7 +106,7 @@ impl<F: Features> SceneContext<'_, F> {
     /// lamp. The offset of the point is a bound for all coordinates of the scene, and may be larger than the
     /// distance of a surface before the lamp, which would then not hide it.
     #[inline]
-    pub(in crate::transport) fn ended_at_lamp(&self, light: u32, ray: Ray) -> Ray {
+    pub(crate) fn ended_at_lamp(&self, light: u32, ray: Ray) -> Ray {
         let shear = Shear::new(ray.direction);
         let mut end = f32::INFINITY;
         for triangle in self.lights.triangles_of(light) {
@@ -62,32 +119,8 @@ impl<F: Features> SceneContext<'_, F> {
         if end < f32::INFINITY { Ray { t_max: BEFORE_LAMP * end, ..ray } } else { ray }
     }
 
-    /// Traces the first `count` of `shadows` and calls `arrive` with each ray that reaches its light and with
-    /// the transmitted light. Returns the number of rays that hit too many cut-outs. Increments `rays` per
-    /// ray.
-    pub(in crate::transport) fn trace_shadow_rays(
-        &self,
-        shadows: &mut ShadowRays,
-        count: usize,
-        rays: &mut u64,
-        mut arrive: impl FnMut(&Ray, Rgb),
-    ) -> u64 {
-        if self.has_cutouts {
-            return self.trace_through_cutouts(shadows, count, rays, arrive);
-        }
-        *rays += count as u64;
-        let ShadowRays { rays, light, hidden, .. } = shadows;
-        let (rays, hidden) = (&rays[..count], &mut hidden[..count]);
-        self.bvh.occluded_batch(self.level, rays, hidden);
-        for ((ray, light), hidden) in rays.iter().zip(&**light).zip(&*hidden) {
-            if *hidden == 0 {
-                arrive(ray, Rgb::from(*light));
-            }
-        }
-        0
-    }
-
-    /// [`Self::trace_shadow_rays`] with cut-outs: in each pass every ray advances to its next surface.
+    /// [`ShadowRays::trace`] with cut-outs: in each pass every ray advances to its next surface. Returns the
+    /// number of rays that hit too many.
     fn trace_through_cutouts(
         &self,
         shadows: &mut ShadowRays,
@@ -128,7 +161,7 @@ impl<F: Features> SceneContext<'_, F> {
 
     /// Part of `light` that arrives along `ray` through cut-outs. `None` if the ray hits more than
     /// [`MAX_CROSSINGS`] of them. Increments `rays` per ray.
-    pub(in crate::transport) fn transmit(&self, mut ray: Ray, mut light: Rgb, rays: &mut u64) -> Option<Rgb> {
+    pub(crate) fn transmit(&self, mut ray: Ray, mut light: Rgb, rays: &mut u64) -> Option<Rgb> {
         for _ in 0..=MAX_CROSSINGS {
             *rays += 1;
             let hit = self.nearest(&ray);
@@ -143,7 +176,7 @@ impl<F: Features> SceneContext<'_, F> {
     }
 
     /// Rest of a shadow ray behind `hit`, and the transmittance; `None` at an opaque surface.
-    pub(in crate::transport) fn pass_cutout(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
+    pub(crate) fn pass_cutout(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
         // Most surfaces are opaque: leave before the surface point is computed.
         let triangle = self.scene.mesh.triangles.get(hit.triangle as usize)?;
         if !self.scene.materials.get(triangle.material as usize)?.has_cutout() {

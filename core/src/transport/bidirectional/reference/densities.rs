@@ -5,8 +5,8 @@ use crate::bsdf::BsdfSample;
 use crate::geometry::Hit;
 use crate::light::LightType;
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::arrival::Arrival;
-use crate::transport::bidirectional::vertex::{is_bent, normal_for_lights};
+use crate::transport::walk::sums::Arrival;
+use crate::transport::walk::vertex::{Scatterer, is_bent_at};
 use glam::Vec3;
 
 /// Segments of a path at most.
@@ -182,7 +182,7 @@ impl Reference<'_> {
             is_caster: vertex.is_delta || by_camera.1.is_caustic_caster(),
             merges,
             arrival,
-            is_bent: is_bent(&by_light.0, by_light.0.frame.to_local(narrow(to_light))),
+            is_bent: is_bent_at(&by_light.0, narrow(to_light)),
         })
     }
 
@@ -288,7 +288,8 @@ impl Reference<'_> {
             _ => narrow(path.towards(1, 2).0),
         };
         let (point, bsdf) = self.seen_along(first, -to_camera)?;
-        let (normal, from, way) = (normal_for_lights(&point, &bsdf), first.position, narrow(to_light));
+        let (normal, from, way) =
+            (Scatterer { point: &point, bsdf: &bsdf }.normal_for_lights(), first.position, narrow(to_light));
         let [emission, light_sample, cos] = match self.kind(index) {
             LightType::Area => {
                 let (light, triangle) = (position?, lights.triangle_of(index)?);

@@ -7,9 +7,9 @@ use crate::bsdf::BsdfSample;
 use crate::geometry::Hit;
 use crate::light::LightType;
 use crate::transport::bidirectional::light_pass::{DIMENSIONS, SEED, continuation};
-use crate::transport::bidirectional::vertex::is_bent;
 use crate::transport::settings::Counters;
 use crate::transport::walk::light::{Continuation, LightPathState, Vertex, Visitor};
+use crate::transport::walk::vertex::is_bent_at;
 use glam::Vec3;
 
 /// A light path: where it starts, and its vertices.
@@ -79,7 +79,7 @@ impl Visitor for Recorder<'_, '_> {
         _: &mut Counters,
     ) -> Option<Continuation> {
         let Vertex { point, bsdf, .. } = *vertex;
-        if is_bent(point, point.frame.to_local(vertex.to_light)) {
+        if is_bent_at(point, vertex.to_light) {
             return None;
         }
         let path = self.paths.get_mut(state.number as usize)?;

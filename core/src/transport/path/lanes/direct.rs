@@ -6,12 +6,14 @@ use crate::geometry::Ray;
 use crate::sampling::Sampler;
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::LightEstimator;
-use crate::transport::path::shade::Path;
+use crate::transport::path::scalar::Path;
 use crate::transport::path::sharing::{PathMemory, Sharing};
 use crate::transport::walk::block::{Block, Stages};
+use crate::transport::walk::block_stages::Numbered;
 use crate::transport::walk::dimension;
 use crate::transport::walk::points::Set;
-use crate::transport::wavefront::{TO_ENVIRONMENT, Wavefront};
+use crate::transport::walk::shadow_tag::ShadowTag;
+use crate::transport::wavefront::Wavefront;
 use bytemuck::Zeroable;
 use halflight_simd::kernels::shade::direct::Direct;
 use halflight_simd::kernels::shade::{at, put};
@@ -24,9 +26,9 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         (block, memory): (&mut Block<'a>, &mut PathMemory<E::State, R>),
         wave: &mut Wavefront,
         estimated: &Estimated<'_, 'a>,
-        lit: u32,
+        (stage, lit): (&Numbered, u32),
     ) {
-        let lit = block.begin_light(lit);
+        let lit = block.begin_light(stage, lit);
         if E::ADDS_NOTHING {
             return self.direct_of((block, memory), wave, estimated, lit);
         }
@@ -94,12 +96,11 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                     block.others[i].base_part(wo, wi, f)
                 });
             }
-            let is_later = block.environment >> i & 1 == 1;
-            let tag = block.path[i] | if is_later { TO_ENVIRONMENT } else { 0 };
+            let ShadowTag(tag) = ShadowTag::of_light_sample(block.path[i], block.environment >> i & 1 == 1);
             let [r, g, b, _] = block.shadows.contribution[i];
             let light = if is_apart { at(&block.apart.contribution, i) } else { [r, g, b] };
             let ray = block.shadow_ray(&self.context, i);
-            wave.push_shadow_ray(Ray { tag, ..ray }, light.into());
+            wave.shadows.push(Ray { tag, ..ray }, light.into());
         }
     }
 
@@ -113,9 +114,6 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         estimated: &Estimated,
         Stages { met, single, .. }: Stages,
     ) {
-        if E::ADDS_NOTHING {
-            return;
-        }
         let (scene, mut none) = ((&self.context, &self.settings), (E::State::zeroed(), R::State::zeroed()));
         let connects = if self.estimator.connections() > 0 { met } else { 0 };
         for i in Set(single | connects) {
@@ -127,7 +125,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             }
             if R::may_connect(shared) {
                 let tag = vertex.path as u32;
-                let mut push = |ray, light| wave.push_shadow_ray(Ray { tag, ..ray }, light);
+                let mut push = |ray, light| wave.shadows.push(Ray { tag, ..ray }, light);
                 self.estimator.connect(scene, vertex, state, &mut push);
             }
         }

@@ -3,31 +3,31 @@
 //! A stage is either a kernel over all vertices of the block or a loop over them. Loops gather inputs, look
 //! up materials, textures, cells of an environment map and estimators, and replace the kernels at rare
 //! vertices: normal maps, degenerate triangles, rough dielectrics, textured, point and directional lights.
-//! Vertices at which an estimator separates the coat or weighs samples are shaded one by one
-//! (`path/shade.rs`). Both compute the same bits.
+//! Vertices at which an estimator weighs samples are shaded one by one (`path/scalar.rs`), as all are at
+//! levels without lanes. Both compute the same bits.
 
 mod direct;
 mod scatter;
 
 use super::PathIntegrator;
 use super::estimator::{LightEstimator, PathVertex, RemainingLight};
-use super::shade::{Path, Shading};
+use super::scalar::Path;
 use super::sharing::{PathMemory, Sharing};
-use crate::bsdf::{COATS, Features};
+use crate::bsdf::Features;
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
 use crate::transport::walk::block::{Block, Stages};
-use crate::transport::walk::dimension;
+use crate::transport::walk::block_stages::Cleared;
 use crate::transport::walk::points::Set;
-use crate::transport::wavefront::{BLOCK, Wavefront};
+use crate::transport::wavefront::{Shade, Wavefront};
 use bytemuck::Zeroable;
 use core::ops::Range;
-use halflight_simd::kernels::shade::put;
+use halflight_simd::kernels::shade::{BLOCK, put};
 
-/// Vertices of a block as an estimator takes them, and the light that it leaves to their paths. None without
-/// an estimator.
+/// Vertices of a block as an estimator takes them, and the light that it leaves to their paths. None in lanes
+/// without an estimator.
 struct Estimated<'v, 'a> {
     vertices: [Option<(PathVertex<'v, 'a>, RemainingLight)>; BLOCK],
 }
@@ -46,9 +46,20 @@ struct Points<'a, L> {
     found: [L; BLOCK],
 }
 
-impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E, R> {
-    /// Shades the vertices of `range` in lanes.
-    pub(super) fn shade_block(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
+/// Path tracer and the memory of a wave beside the wavefront.
+pub(super) struct Shading<'i, 'a, 'm, F: Features, E: LightEstimator<F>, R: Sharing> {
+    pub(super) integrator: &'i PathIntegrator<'a, F, E, R>,
+    pub(super) memory: &'i mut PathMemory<'m, E::State, R>,
+    pub(super) block: Block<'a>,
+}
+
+impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, E, R> {
+    fn shadow_rays(&self) -> usize {
+        let PathIntegrator { context, estimator, .. } = self.integrator;
+        (estimator.light_samples(context) + estimator.connections()) as usize
+    }
+
+    fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
         let Self { integrator, memory, block } = self;
         let PathIntegrator { context, settings, estimator, .. } = integrator;
         let hits = integrator.gather_block(block, memory, wave, range.clone());
@@ -58,24 +69,28 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> Shading<'_, 'a, '_, F, E
         let traced = (&wave.rays[range.clone()], &wave.hits[range.clone()]);
         let hits = block.points.compute(context, traced, hits);
         let mut points = Points { points: [const { None }; BLOCK], found: [E::Found::default(); BLOCK] };
-        if !E::ADDS_NOTHING {
+        let has_lanes = context.has_lanes();
+        if !(E::ADDS_NOTHING && has_lanes) {
             Set(hits).for_each(|i| points.points[i] = Some(block.points.point(i)));
             let Points { points, found } = &mut points;
             estimator.look_up((context, settings), (wave, range.clone()), points, found, counters);
         }
         let mut estimated = Estimated { vertices: [const { None }; BLOCK] };
         let wave_at = (&mut *wave, range.start);
-        let stages =
+        let (stages, cleared) =
             integrator.arrive_in_block((block, memory), wave_at, (&points, hits), &mut estimated, counters);
-        if stages.met != 0 {
-            block.number(context.level, context.lights.has_many_lights());
-            if !context.lights.is_empty() {
-                integrator.direct_in_block((block, memory), wave, &estimated, stages.lit);
-            }
+        let chooses = context.lights.has_many_lights();
+        let numbered = (has_lanes && stages.met != 0).then(|| {
+            let filled = block.see(context.level, cleared);
+            block.number(context.level, filled, chooses)
+        });
+        if let Some(stage) = numbered.as_ref().filter(|_| !context.lights.is_empty()) {
+            integrator.direct_in_block((block, memory), wave, &estimated, (stage, stages.lit));
         }
         integrator.direct_singly(memory, wave, &estimated, stages);
-        if stages.met != 0 {
-            integrator.scatter_in_block((block, memory), wave, &estimated, stages.onward, counters);
+        if let Some(stage) = &numbered {
+            let onward = (stage, stages.onward);
+            integrator.scatter_in_block((block, memory), wave, &estimated, onward, counters);
         }
         integrator.scatter_singly(memory, wave, &estimated, stages.single, counters);
     }
@@ -128,10 +143,10 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         (points, hits): (&'v Points<'a, E::Found>, u32),
         estimated: &mut Estimated<'v, 'a>,
         counters: &mut Counters,
-    ) -> Stages {
+    ) -> (Stages, Cleared) {
         let mut none = (E::State::zeroed(), R::State::zeroed());
-        let mut stages = Stages::default();
-        block.clear_bsdfs();
+        let (mut stages, has_lanes) = (Stages::default(), self.context.has_lanes());
+        let stage = block.clear();
         for i in Set(hits) {
             let index = block.path[i] as usize;
             let Some(mut path) = memory.path(wave.paths, index, &mut none) else { continue };
@@ -153,13 +168,13 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             }
             put(&mut block.throughput, i, path.path.throughput);
             let (one, mut apart) = (1 << i, None);
-            if E::ADDS_NOTHING {
+            if E::ADDS_NOTHING && has_lanes {
                 path.path.classes = path.path.classes.behind(&bsdf);
             } else if let Some(point) = &points.points[i] {
                 let found = points.found[i];
                 let vertex = self.vertex(path.path, (&ray, point), (bsdf, &found));
                 let rest = self.known(path, &vertex, found);
-                let is_single = self.estimator.weighs_samples(&bsdf);
+                let is_single = !has_lanes || self.estimator.weighs_samples(&bsdf);
                 apart = vertex.apart.then_some((rest.base_weight, rest.is_lit));
                 (block.light_samples[i], block.each[i]) =
                     (rest.light_samples, 1.0 / rest.light_samples as f32);
@@ -175,18 +190,15 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
                 }
             }
             stages.met |= one;
-            block.put_bsdf::<F>(i, &bsdf, block.segments[i]);
+            block.put::<F>(&stage, i, &bsdf);
             if let Some((base_weight, is_supplied)) = apart {
-                block.separate_coat(i, base_weight, is_supplied);
+                block.separate_coat(&stage, i, base_weight, is_supplied);
             }
-        }
-        if block.coats.exists != 0 {
-            block.coats.see(self.context.level, &block.points.surface, &COATS);
         }
         if E::ADDS_NOTHING {
             (stages.lit, stages.onward) = (stages.met, stages.met);
         }
-        stages
+        (stages, stage)
     }
 
     /// Adds emission at vertex `i`, the `hit` of `ray`. `Err` if the path does not scatter there: the next
@@ -205,14 +217,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         let is_cutout = F::CUTOUT && material.has_cutout();
         if triangle == path.triangle || is_cutout || segments == 1 && !front {
             let point = block.points.point(i);
-            let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
-            let opacity = || sampler.single(dimension::opacity(segments, u32::from(path.crossings)));
-            if segments == 1 && point.is_left_by(ray)
-                || self.context.is_skipped(&point, hit, path.triangle, opacity)
-            {
-                let through = point.spawn(ray.direction.into());
-                return Err(path.skip_surface(through, triangle, counters));
-            }
+            path.stop(&self.context, (ray, hit), &point, self.settings.seed, counters)?;
         }
         if material.emits() {
             self.emission(path, state, &block.points.point(i), ray.direction.into());

@@ -5,11 +5,12 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Diffuse, Features};
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::LightEstimator;
-use crate::transport::path::shade::Path;
+use crate::transport::path::scalar::Path;
 use crate::transport::path::sharing::{PathMemory, Sharing};
 use crate::transport::settings::Counters;
 use crate::transport::walk::block::Block;
 use crate::transport::walk::block_scatter::Sets;
+use crate::transport::walk::block_stages::Numbered;
 use crate::transport::walk::points::Set;
 use crate::transport::wavefront::Wavefront;
 use bytemuck::Zeroable;
@@ -23,14 +24,14 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         (block, memory): (&mut Block<'a>, &mut PathMemory<E::State, R>),
         wave: &mut Wavefront,
         estimated: &Estimated<'_, 'a>,
-        onward: u32,
+        (stage, onward): (&Numbered, u32),
         counters: &mut Counters,
     ) {
         if onward == 0 {
             return;
         }
         let level = self.context.level;
-        let mut sets = block.sample_bsdfs::<F>(level, onward);
+        let mut sets = block.sample_bsdfs::<F>(level, stage, onward);
         if !E::ADDS_NOTHING {
             // A coat over a cached base is dark, but all noise of the pixel is its own.
             let dark = |i: &usize| block.segments[*i] == 1 && block.coats.base_weight[*i] < 1.0;

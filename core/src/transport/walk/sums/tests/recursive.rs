@@ -1,7 +1,7 @@
 //! Weights of all techniques by running sums, as both walks carry them.
 
 use super::{Mistake, Path};
-use crate::transport::bidirectional::mis::*;
+use crate::transport::walk::sums::*;
 use std::vec;
 use std::vec::Vec;
 

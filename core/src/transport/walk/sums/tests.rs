@@ -3,7 +3,6 @@
 
 use super::*;
 use crate::sampling::Random;
-use crate::transport::bidirectional::arrival::Arrival;
 use std::vec;
 use std::vec::Vec;
 

@@ -1,98 +1,30 @@
-//! Shading vertex by vertex: at levels without lanes, and the reference of `lanes`, whose kernels shade a
-//! block of sixteen. The steps are in textbook order for the whole block: escape and emission, light of the
-//! estimator, next-event estimation (`direct.rs`), next direction by BSDF sampling and Russian roulette.
+//! The scalar fall-back of shading: the events of one vertex of a path in textbook order, escape, emission,
+//! light of the estimator, next-event estimation (`direct.rs`), next direction by BSDF sampling and Russian
+//! roulette. `lanes` calls them for vertices that it does not shade in lanes: at levels without lanes all of
+//! them, elsewhere those at which an estimator weighs samples.
 
 use super::PathIntegrator;
 use super::estimator::{EmissionHit, KnownLight, LightEstimator, PathVertex, RemainingLight};
-use super::sharing::PathMemory;
-use super::sharing::Sharing;
+use super::sharing::{PathMemory, Sharing};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
-use crate::geometry::{Hit, Ray};
+use crate::geometry::Ray;
 use crate::light::emitted;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
-use crate::transport::walk::block::Block;
 use crate::transport::walk::dimension;
 use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
-use crate::transport::walk::termination::{continuation_probability, is_cut};
-use crate::transport::wavefront::{BLOCK, PathState, Shade, Wavefront};
-use bytemuck::Zeroable;
-use core::ops::Range;
+use crate::transport::walk::termination::{is_cut, survive};
+use crate::transport::walk::vertex::Scatterer;
+use crate::transport::wavefront::PathState;
 use glam::Vec3;
-
-/// Path tracer and the memory of a wave beside the wavefront.
-pub(super) struct Shading<'i, 'a, 'm, F: Features, E: LightEstimator<F>, R: Sharing> {
-    pub(super) integrator: &'i PathIntegrator<'a, F, E, R>,
-    pub(super) memory: &'i mut PathMemory<'m, E::State, R>,
-    pub(super) block: Block<'a>,
-}
 
 /// One path of a wave, with the states of the estimator and of sharing.
 pub(super) struct Path<'p, S, T> {
     pub(super) path: &'p mut PathState,
     pub(super) state: &'p mut S,
     pub(super) shared: &'p mut T,
-}
-
-impl<F: Features, E: LightEstimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, E, R> {
-    fn shadow_rays(&self) -> usize {
-        let PathIntegrator { context, estimator, .. } = self.integrator;
-        (estimator.light_samples(context) + estimator.connections()) as usize
-    }
-
-    fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
-        if self.integrator.context.has_lanes() {
-            return self.shade_block(wave, range, counters);
-        }
-        let Self { integrator, memory, .. } = self;
-        let PathIntegrator { context, settings, estimator, .. } = integrator;
-        // Placeholders of stateless estimators and sharing rules.
-        let mut none = (E::State::zeroed(), R::State::zeroed());
-
-        let mut points = [const { None }; BLOCK];
-        for (point, i) in points.iter_mut().zip(range.clone()) {
-            *point = context.surface_at(&wave.rays[i], &wave.hits[i]);
-        }
-        let mut found = [E::Found::default(); BLOCK];
-        estimator.look_up((context, settings), (wave, range.clone()), &points, &mut found, counters);
-
-        let mut vertices = [const { None }; BLOCK];
-        for (((vertex, point), found), i) in vertices.iter_mut().zip(&points).zip(&found).zip(range) {
-            let (ray, hit) = (wave.rays[i], wave.hits[i]);
-            let index = ray.tag as usize;
-            let Some(path) = memory.path(wave.paths, index, &mut none) else { continue };
-            match integrator.arrive(path, (&ray, &hit), (point.as_ref(), found), counters) {
-                Ok(met) => *vertex = Some(met),
-                Err(Some(through)) => wave.push_ray(index, through),
-                Err(None) => {}
-            }
-        }
-        let mut rests = [const { None }; BLOCK];
-        for ((rest, vertex), found) in rests.iter_mut().zip(&vertices).zip(found) {
-            let Some(vertex) = vertex else { continue };
-            let Some(path) = memory.path(wave.paths, vertex.path, &mut none) else { continue };
-            *rest = Some(integrator.known(path, vertex, found));
-        }
-        let lit = || vertices.iter().flatten().zip(rests.iter().flatten());
-        for (vertex, rest) in lit() {
-            let state = memory.states.get_mut(vertex.path).unwrap_or(&mut none.0);
-            let shared = memory.shared.get_mut(vertex.path).unwrap_or(&mut none.1);
-            integrator.direct((&*state, &mut *shared), vertex, rest, wave);
-            if R::may_connect(shared) {
-                let tag = vertex.path as u32;
-                let mut push = |ray, light| wave.push_shadow_ray(Ray { tag, ..ray }, light);
-                estimator.connect((context, settings), vertex, state, &mut push);
-            }
-        }
-        for (vertex, rest) in lit().filter(|(vertex, rest)| !rest.ends || vertex.apart) {
-            let Some(path) = memory.path(wave.paths, vertex.path, &mut none) else { continue };
-            if let Some(ray) = integrator.scatter(path, vertex, rest, counters) {
-                wave.push_ray(vertex.path, ray);
-            }
-        }
-    }
 }
 
 impl<S, R: Sharing> PathMemory<'_, S, R> {
@@ -113,45 +45,6 @@ impl<S, R: Sharing> PathMemory<'_, S, R> {
 }
 
 impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
-    /// Adds the emission at the hit of `ray` and prepares the scattering vertex. `Err` if there is none:
-    /// `Some` next ray behind a skipped surface, or `None` if the path ends.
-    #[inline]
-    fn arrive<'v>(
-        &self,
-        Path { path, state, shared }: Path<E::State, R::State>,
-        (ray, hit): (&Ray, &Hit),
-        (point, found): (Option<&'v SurfacePoint<'a>>, &E::Found),
-        counters: &mut Counters,
-    ) -> Result<PathVertex<'v, 'a>, Option<Ray>> {
-        R::resume(shared, path);
-        if !hit.is_some() {
-            self.escape(path, state, ray);
-            return Err(None);
-        }
-        let point = point.ok_or(None)?;
-        let segments = u32::from(path.segments);
-        let direction = Vec3::from(ray.direction);
-        let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
-
-        // A camera on a surface does not see the back of that surface.
-        let opacity = || sampler.single(dimension::opacity(segments, u32::from(path.crossings)));
-        if segments == 1 && point.is_left_by(ray)
-            || self.context.is_skipped(point, hit, path.triangle, opacity)
-        {
-            return Err(path.skip_surface(point.spawn(direction), hit.triangle, counters));
-        }
-        self.emission(path, state, point, direction);
-        if segments >= self.settings.max_depth {
-            return Err(None);
-        }
-        let bsdf = self.context.bsdf_at(point);
-        if path.classes.ends_at(&bsdf) {
-            return Err(None);
-        }
-        self.enter((path, state, shared), point, &bsdf)?;
-        Ok(self.vertex(path, (ray, point), (bsdf, found)))
-    }
-
     /// Prepares a path to scatter at `point`. `Err` if it ends.
     #[inline]
     pub(super) fn enter(
@@ -288,24 +181,16 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             false => bsdf.base_part(wo, sample.direction, sample.weight * sample.pdf),
         });
         path.classes = if is_coat { rest.narrow } else { rest.wide? };
-        let mut throughput = vertex.throughput * sample.weight;
+        let throughput = vertex.throughput * sample.weight;
         // A coat over a cached base is dark, but all noise of the pixel is its own.
         let is_first_coat = is_coat && rest.base_weight < 1.0 && segments == 1;
         let survives = R::leave(shared, (point, bsdf), throughput, segments) || is_first_coat;
-        let direction = point.frame.to_world(sample.direction);
-        if !point.sides_agree(sample.direction, direction) {
-            return None;
-        }
+        let direction = Scatterer { point, bsdf }.towards(&sample)?;
         path.eta_squared *= sample.eta * sample.eta;
         let pixel_throughput = R::throughput(shared, throughput) * path.eta_squared;
-        let continuation_probability =
-            if survives { 1.0 } else { continuation_probability(segments, pixel_throughput) };
-        if continuation_probability < 1.0 {
-            if sampler.single(first + dimension::ROULETTE) >= continuation_probability {
-                return None;
-            }
-            throughput /= continuation_probability;
-        }
+        let roulette = || sampler.single(first + dimension::ROULETTE);
+        let survival = if survives { Some(1.0) } else { survive(segments, pixel_throughput, roulette) };
+        let throughput = throughput / survival?;
         if throughput == Rgb::ZERO {
             return None;
         }
