@@ -1,7 +1,7 @@
 //! Choice of a method by predicted error: a [`Table`] of candidates, each with its prediction, of which the
-//! first is taken that no other undercuts by enough. Predictions are those of a [`Trial`] of paths and records
-//! and of the pilot of [`super::counts`]. Work is counted in rays and not in seconds: the choice follows from
-//! scene, settings, seed, memory and, where time is limited, the number of threads.
+//! first is chosen that no other undercuts by enough. Predictions are those of a [`Trial`] of paths and
+//! records and of the pilot of [`super::counts`]. Work is counted in rays and not in seconds: the choice
+//! follows from scene, settings, seed, memory and, where time is limited, the number of threads.
 
 mod goal;
 mod prediction;

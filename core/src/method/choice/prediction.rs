@@ -63,8 +63,8 @@ impl Trial {
         }
     }
 
-    /// All candidates for `goal`. `without_caches` is a reason against caches; `light_paths` are the counts of
-    /// a pilot, or the reason for none.
+    /// All candidates for `goal`. `without_caches` is a reason against caches; `light_paths` are the counts
+    /// of a pilot, or the reason for none.
     pub fn table(
         &self,
         goal: &Goal,

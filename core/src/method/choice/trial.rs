@@ -49,7 +49,7 @@ pub struct TrialCaches {
 
 /// Variance of the pixels of each of the `pictures` of a tile, relative to the light of pixels and blocks of
 /// the first one, and the number of pixels. Their `mean` radiance is that of the whole picture.
-pub fn variances<const N: usize>(pictures: [&[Pixel]; N], mean: f64) -> ([f64; N], f64) {
+fn variances<const N: usize>(pictures: [&[Pixel]; N], mean: f64) -> ([f64; N], f64) {
     let brightness = |light: Rgb| f64::from(light.element_sum()) / 3.0;
     let (mut sums, mut count) = ([0.0; N], 0.0);
     for (number, block) in pictures[0].chunks(BLOCK).enumerate() {

@@ -10,14 +10,19 @@ use crate::method::caustics::CausticPathTracing;
 use crate::method::choice::{Trial, TrialCaches};
 use crate::method::{Executor, RenderMethod, counts};
 
-/// The plan of the method that suits the picture, `None` for `paths`, and the finding on it. `None` where time
-/// is too short for a trial.
+/// Outcome of a choice: the plan of another method than path tracing, and the table with the reason.
+pub(super) struct Chosen<'a, F> {
+    pub(super) instead: Option<MethodPlan<'a, F>>,
+    pub(super) finding: Finding,
+}
+
+/// The method that suits the picture, besides `paths`. `None` where time is too short for a trial.
 pub(super) fn choose<'a: 'm, 'm, F: Features>(
     paths: &mut CausticPathTracing<F>,
     setup: &MethodSetup<'a, '_>,
     memory: &mut impl MemorySource<'m>,
     executor: &mut impl Executor,
-) -> Result<Option<(Option<MethodPlan<'a, F>>, Finding)>, OutOfMemory> {
+) -> Result<Option<Chosen<'a, F>>, OutOfMemory> {
     let MethodSetup { context, options, goal, .. } = setup;
     if !goal.affords_trial(context.pixels()) {
         return Ok(None);
@@ -44,14 +49,14 @@ pub(super) fn choose<'a: 'm, 'm, F: Features>(
     });
     let table = trial.table(goal, without_caches(setup), light_paths);
     let best = *table.best();
-    let plan = match (best.kind, light_paths) {
+    let instead = match (best.kind, light_paths) {
         (MethodKind::Path, _) => None,
         (kind @ (MethodKind::Bidirectional | MethodKind::VertexMerging), Ok(choice)) => {
             Some(MethodPlan::with_counts(kind, choice))
         }
         (kind, _) => Some(MethodPlan { picture: best.picture, ..kind.into() }),
     };
-    Ok(Some((plan, table.finding())))
+    Ok(Some(Chosen { instead, finding: table.finding() }))
 }
 
 /// A reason against caches.

@@ -1,7 +1,7 @@
 //! Setup of path tracing with all of its means: path reuse and caustic photons. Where the plan is open,
 //! another method may take its place.
 
-use super::choice::choose;
+use super::choice::{Chosen, choose};
 use super::{AnyMethod, Attempt, MethodKind, MethodPlan, MethodSetup};
 use crate::bsdf::Features;
 use crate::memory::{MemorySource, OutOfMemory};
@@ -37,7 +37,7 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     let caustics = method.finding();
     let mut findings = plan.findings;
     if plan.is_open
-        && let Some((instead, finding)) = choose(&mut method, setup, memory, executor)?
+        && let Some(Chosen { instead, finding }) = choose(&mut method, setup, memory, executor)?
     {
         findings = findings.and(Some(finding));
         if let Some(plan) = instead {
