@@ -45,6 +45,15 @@ pub enum Value {
     Number(f64),
     /// Name of a choice.
     Name(&'static str),
+    /// Predicted picture of a candidate.
+    Prediction {
+        /// relMSE; infinite where it is no choice.
+        error: f64,
+        /// Rays of a sample of a pixel.
+        work: f64,
+        /// Origin of the prediction, or the reason for none.
+        reason: &'static str,
+    },
 }
 
 /// Decision on one part of a method, with its reason and numbers.
@@ -98,6 +107,7 @@ impl Finding {
         match self.values().find(|(other, _)| *other == name)?.1 {
             Value::Count(count) => Some(count as f64),
             Value::Seconds(value) | Value::Fraction(value) | Value::Number(value) => Some(value),
+            Value::Prediction { error, .. } => error.is_finite().then_some(error),
             Value::Name(_) => None,
         }
     }

@@ -42,6 +42,10 @@ pub fn readable_value(value: Value) -> String {
         Value::Fraction(fraction) => percent(fraction),
         Value::Number(value) => number(value, 3),
         Value::Name(name) => name.to_owned(),
+        Value::Prediction { error, work, reason } if error.is_finite() => {
+            format!("relMSE {}, {} rays a sample: {reason}", number(error, 2), number(work, 2))
+        }
+        Value::Prediction { reason, .. } => format!("no choice: {reason}"),
     }
 }
 

@@ -54,7 +54,7 @@ fn a_cache_is_chosen_where_indirect_light_is_most_of_the_noise() {
     let room = room_with_up_light();
     let result = chosen(&room, |_| ());
     assert_eq!(result.method, Method::IrradianceCache);
-    let [path, cache] = ["path", "irradiance_cache"].map(|method| number(&result, "method", method));
+    let [path, cache] = ["path", "irradiance-cache"].map(|method| number(&result, "method", method));
     assert!(path > 2.0 * cache && cache > 0.0, "{path} {cache}");
     assert!(result.audit.is_some(), "its bias is measured");
     let audited_by_nobody = chosen(&room, |settings| settings.audit = Some(0.0));
@@ -69,7 +69,7 @@ fn records_of_lobes_are_chosen_where_rough_reflections_are_most_of_the_noise() {
         let result = chosen(&box_from_above(surface, surface), |settings| settings.stop.spp = Some(64));
         assert_eq!(result.method, Method::RadianceCache, "roughness {roughness}");
         let [irradiance, radiance] =
-            ["irradiance_cache", "radiance_cache"].map(|method| number(&result, "method", method));
+            ["irradiance-cache", "radiance-cache"].map(|method| number(&result, "method", method));
         assert!(irradiance > 2.0 * radiance && radiance > 0.0, "{irradiance} {radiance}");
     }
 }
@@ -180,7 +180,7 @@ fn choices() -> String {
                 };
                 let result = render::render(scene, &settings, &mut stop_render, &stopped).expect("a picture");
                 text += &format!("{:>5} spp {:<16}", spp, result.method.name());
-                for method in ["path", "irradiance_cache", "radiance_cache", "light_paths"] {
+                for method in ["path", "irradiance-cache", "radiance-cache", "bdpt"] {
                     let predicted = result.findings.get("method").and_then(|finding| finding.number(method));
                     text += &predicted.map_or("  -      ".into(), |error| format!("  {error:.1e}"));
                 }

@@ -5,31 +5,12 @@
 //! finer ones follow from them. A finer resolution is used where the picture is predicted to gain by it: the
 //! cache is then filled again.
 
+use super::tuned::{
+    CACHE_BIAS, FILLING, FILLING_POWER, FILLING_RAYS, FINER_FILLING, GATHER_RAY, GATHER_RAY_OF_FEW,
+    RECORDS_OF_PIXEL,
+};
 use super::work_of_detail;
 use crate::cache::irradiance::metric::HESSIAN_ERROR;
-
-/// Time of a ray of filling in rays of paths of the same scene, and the part of it that does not grow with
-/// detail, of scenes with few triangles. Within a third on 22 of 24 scenes.
-const GATHER_RAY: f64 = 0.8;
-const GATHER_RAY_OF_FEW: f64 = 1.5;
-
-/// Rays of filling for each pixel of a picture of one pixel at [`CacheResolution::COARSEST`], in rays of
-/// paths; they fall with this power of the pixels. Measured on 17 scenes at 576 and 4096 pixels, within a
-/// factor of two.
-const FILLING_RAYS: f64 = 8550.0;
-const FILLING_POWER: f64 = 0.4;
-
-/// Greatest fraction of the work for filling the coarsest cache, whose radii grow beyond it, and for a finer
-/// one: a cache that is cut has more error than a coarser one.
-const FILLING: f64 = 0.33;
-const FINER_FILLING: f64 = 0.3;
-
-/// Gather rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in
-/// records.
-const RECORDS: f64 = 20.0;
-
-/// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error.
-const BIAS: f64 = 1e-4;
 
 /// Gather rays of a record, and the density of records.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,8 +80,8 @@ impl CachedPicture {
     /// relMSE by records of `resolution`, however many samples there are.
     fn floor(&self, resolution: &CacheResolution) -> f64 {
         let record_rays = f64::from(resolution.strata * resolution.strata);
-        let bias = BIAS * f64::from(resolution.error / CacheResolution::COARSEST.error);
-        self.gathered / (record_rays * RECORDS) + bias
+        let bias = CACHE_BIAS * f64::from(resolution.error / CacheResolution::COARSEST.error);
+        self.gathered / (record_rays * RECORDS_OF_PIXEL) + bias
     }
 
     /// Predicted relMSE after all rays, of which `filling` fill the cache at `resolution`.
@@ -130,25 +111,25 @@ impl CachedPicture {
 mod tests {
     use super::*;
 
-    const FILLING: f64 = 2e6;
+    const COARSEST: f64 = 2e6;
 
     #[test]
     fn longer_renders_have_finer_caches_within_a_part_of_the_work() {
         let mut last = 0.0;
         for rays in [1e5, 1e6, 1e7, 3e7, 1e8, 1e9] {
-            let chosen = CachedPicture::of_time(rays).resolution(FILLING);
-            let filling = FILLING * chosen.filling();
+            let chosen = CachedPicture::of_time(rays).resolution(COARSEST);
+            let filling = COARSEST * chosen.filling();
             assert!(filling >= last && (chosen == CacheResolution::COARSEST || filling <= 0.4 * rays));
             last = filling;
         }
         let of = |rays, filling| CachedPicture::of_time(rays).resolution(filling);
-        assert_eq!(of(1e9, FILLING), CacheResolution::FINEST);
-        assert_eq!(of(1e9, 400.0 * FILLING), CacheResolution::COARSEST);
+        assert_eq!(of(1e9, COARSEST), CacheResolution::FINEST);
+        assert_eq!(of(1e9, 400.0 * COARSEST), CacheResolution::COARSEST);
     }
 
     #[test]
     fn light_of_much_variance_has_more_rays_and_noise_of_samples_leaves_them_out() {
-        let of = |gathered, samples| CachedPicture { rays: 8e7, samples, gathered }.resolution(FILLING);
+        let of = |gathered, samples| CachedPicture { rays: 8e7, samples, gathered }.resolution(COARSEST);
         assert_eq!(of(50.0, 1e4).strata, 32);
         assert_eq!(of(0.1, 1e6), CacheResolution::COARSEST);
         assert!(of(0.1, 1e3).error < CacheResolution::COARSEST.error);

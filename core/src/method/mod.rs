@@ -33,6 +33,7 @@ mod splats;
 pub mod sppm;
 #[cfg(test)]
 mod test_box;
+mod tuned;
 pub mod view_placement;
 mod work;
 

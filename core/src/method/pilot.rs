@@ -1,17 +1,13 @@
 //! Pilots on a few tiles before the picture: its mean radiance, and the gain by path reuse.
 
 use super::executor::Executor;
+use super::tuned::{LEAST_PILOT, PILOT_RAYS, PILOT_SHARE};
 use crate::bsdf::Features;
 use crate::memory::{Arena, OutOfMemory};
 use crate::transport::{Counters, LightEstimator, PathIntegrator, Pilot, path::WAVE};
 
 /// Tiles of a pilot of usual size.
 pub const PILOT_TILES: usize = 16;
-
-/// Rays of all pilots of usual size, their greatest fraction of the work, and their least size.
-const PILOT_RAYS: f64 = 6e6;
-const PILOT_SHARE: f64 = 0.05;
-const LEAST_SIZE: f64 = 0.25;
 
 /// Size of pilots relative to the usual one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +19,7 @@ impl PilotSize {
 
     /// Size for a picture of this number of `rays`: pilots are smaller where there is little time.
     pub fn of_picture(rays: f64) -> Self {
-        Self((PILOT_SHARE * rays / PILOT_RAYS).clamp(LEAST_SIZE, 1.0))
+        Self((PILOT_SHARE * rays / PILOT_RAYS).clamp(LEAST_PILOT, 1.0))
     }
 
     /// The part of a `usual` number that this size has, one or more.

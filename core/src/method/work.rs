@@ -1,12 +1,11 @@
 //! Work that a time limit allows, in rays: it follows from the scene, as no clock is read.
 
-/// Rays per second and thread in a scene of few triangles.
-const RAYS_PER_SECOND: f64 = 6e6;
+use super::tuned::{DOUBLINGS_OF_WORK, FEW_TRIANGLES, RAYS_PER_SECOND};
 
 /// Work in a scene with this number of `triangles` relative to one with few: its hierarchy is deeper, and its
-/// surfaces have more detail. By seconds, measured on 24 scenes of 36 to 383,000 triangles.
+/// surfaces have more detail.
 pub fn work_of_detail(triangles: usize) -> f64 {
-    1.0 + libm::log2(1.0 + triangles as f64 / 4096.0) / 3.0
+    1.0 + libm::log2(1.0 + triangles as f64 / FEW_TRIANGLES) / DOUBLINGS_OF_WORK
 }
 
 /// Rays per second and thread by which a time limit becomes work in a scene with this number of `triangles`.

@@ -87,6 +87,9 @@ fn findings(findings: &Findings) -> Value {
             Value::from(value)
         }
         FindingValue::Name(name) => name.into(),
+        FindingValue::Prediction { error, work, reason } => {
+            json!({ "error": error, "rays_per_sample": work, "reason": reason })
+        }
     };
     let object = |finding: &halflight_core::findings::Finding| {
         let mut object = json!({ "decision": finding.decision.name(), "reason": finding.reason });

@@ -12,7 +12,7 @@ mod setup;
 
 use super::executor::{Executor, Passed};
 use super::splats::{add_splats, splats_of_tile};
-use super::{PhotonMapStore, RenderContext, RenderMethod, Round, light_vertices};
+use super::{MethodKind, PhotonMapStore, RenderContext, RenderMethod, Round, light_vertices};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat};
 use crate::light::EmissionSampler;
@@ -49,6 +49,15 @@ impl BidirectionalSettings {
     /// True if no count is left open.
     pub fn is_complete(&self) -> bool {
         self.light_paths.is_some() && self.connections.is_some() && self.merging.is_some()
+    }
+
+    /// The counts of the method of `kind`; others are open.
+    pub(super) fn of(&self, kind: MethodKind) -> Self {
+        match kind {
+            MethodKind::LightTracing => Self { light_paths: self.light_paths, ..Self::LIGHT_TRACING },
+            MethodKind::Bidirectional => Self { merging: Some(false), ..*self },
+            _ => *self,
+        }
     }
 
     fn connections(&self) -> u32 {

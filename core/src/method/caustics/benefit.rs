@@ -4,43 +4,19 @@
 //! finds so rarely that it would be most of the noise, such as the caustic of a small glass in a large room.
 //! Light that path tracing cannot find, of a point light through glass, needs them however little it is.
 
+use crate::method::tuned::{
+    GATHERING, HIDDEN_LIGHT, LEAST_HITS, MISSING_LIGHT, PHOTON_DOUBT, PHOTON_GAIN, PHOTON_NOISE,
+    PHOTON_SHARE, PHOTONS_VISIBLE,
+};
 use crate::transport::Pilot;
 use crate::transport::caustics::tracer::{BLOCKS, GuideSample};
 use core::f64::consts::PI;
 
-/// Least fraction of the picture's light for which photons pay, of light that path tracing finds badly.
-const LEAST_SHARE: f64 = 3.5e-2;
-
-/// Least relative variance of that light by path tracing alone, over that of all other light and over that of
-/// the photons, for which photons pay as well.
-const LEAST_NOISE: f64 = 0.5;
-const LEAST_GAIN: f64 = 2.0;
-
-/// Least fraction of light paths that the camera sees, for photons that pay by noise.
-const LEAST_VISIBLE: f64 = 0.0125;
-
-/// The part of the least share from which on a first test is undecided. The test finds a half to twice the
-/// share, and a tenth of the visible paths as long as it has not learned which of many lights matter.
-const DOUBT_SHARE: f64 = 0.25;
-
-/// Samples of a picture, and how often its paths must find light for this light to be noise. Light that is
-/// found less often is missing.
+/// Samples of a picture.
 const SAMPLES: f64 = 64.0;
-const LEAST_HITS: f64 = 4.0;
-
-/// Fraction of the picture's light from which on photons stay because path tracing never finds it. No pilot
-/// sees it.
-const MOST_MISSING: f64 = 5e-3;
-
-/// The same of light that path tracing finds with no number of samples. Less of it is below the rounding of
-/// pictures.
-const MOST_HIDDEN: f64 = 1e-6;
 
 /// Samples of a pilot. It does not see light that is found less often.
 const PILOT_SAMPLES: f64 = 4.0 * 16.0 * 1024.0;
-
-/// Work of a path that gathers photons, relative to one that does not, for the same rays.
-const GATHERING: f64 = 1.45;
 
 /// Largest photon budget, relative to the usual one; and the ratio of the photons' light to all other from
 /// which on the budget grows.
@@ -184,31 +160,31 @@ impl Benefit {
 
     /// True if more light paths may find that photons pay.
     pub(super) fn may_pay(&self) -> bool {
-        self.is_needed() || self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= LEAST_VISIBLE
+        self.is_needed() || self.share >= PHOTON_DOUBT * PHOTON_SHARE || self.visible >= PHOTONS_VISIBLE
     }
 
     /// True if photons may pay by their share of the light alone.
     pub(super) fn pays(&self) -> bool {
-        self.is_needed() || self.share >= LEAST_SHARE
+        self.is_needed() || self.share >= PHOTON_SHARE
     }
 
     /// True if photons carry light that path tracing finds with no number of samples. A picture without
     /// them would be wrong, not noisy.
     pub(super) fn is_needed(&self) -> bool {
-        self.hidden >= MOST_HIDDEN
+        self.hidden >= HIDDEN_LIGHT
     }
 
     /// True if photons may pay in a picture whose samples have the relative variance `noise`.
     pub(super) fn pays_beside(&self, noise: f64) -> bool {
-        let least = (LEAST_NOISE * noise).max(LEAST_GAIN * self.noise_of_photons);
-        self.visible >= LEAST_VISIBLE && self.noise >= least
+        let least = (PHOTON_NOISE * noise).max(PHOTON_GAIN * self.noise_of_photons);
+        self.visible >= PHOTONS_VISIBLE && self.noise >= least
     }
 
     /// Variance and work of path tracing alone, whose `pilot` ran with path reuse or not, for a comparison
     /// with photons.
     pub(super) fn path_tracing(&self, pilot: &Pilot, has_reuse: bool) -> PathTracingCost {
         // Light that is never found is not noise: without photons the picture would lack it.
-        let is_missing = self.is_needed() || self.missing >= MOST_MISSING;
+        let is_missing = self.is_needed() || self.missing >= MISSING_LIGHT;
         let rare = if is_missing { f64::INFINITY } else { self.rare };
         PathTracingCost { scatter: pilot.scatter(has_reuse) + rare, work: pilot.work(has_reuse) }
     }

@@ -1,25 +1,13 @@
 //! End of a picture, and the pilots that it affords.
 
 use crate::method::counts::pilot;
+use crate::method::tuned::{
+    COUNTS_FEWEST_PIXELS, COUNTS_RAYS_OF_PIXEL, COUNTS_SHARE_OF_PIXELS, RAYS_PER_SAMPLE, SAMPLES_OF_PILOTS,
+    TRIAL_RAYS, TRIAL_SHARE,
+};
 
 /// Samples of a pixel in a trial.
 pub(super) const SAMPLES: u32 = 4;
-
-/// Rays of a trial of [`SAMPLES`], its greatest fraction of the work, and rays of a sample before a trial has
-/// counted them.
-const TRIAL_RAYS: f64 = 2.5e5;
-const TRIAL_SHARE: f64 = 0.25;
-const RAYS_PER_SAMPLE: f64 = 8.0;
-
-/// Work of a pixel of the pilot, and the fraction of the work that its pixels may take where it is larger.
-const RAYS_OF_PILOT_PIXEL: f64 = 300.0;
-const PILOT_PIXELS: f64 = 0.02;
-
-/// Fewest pixels of the pilot of counts where time alone ends the picture.
-const FEWEST_PILOT_PIXELS: f64 = 512.0;
-
-/// Fewest samples of a pixel for which pilots gain more than they cost.
-const FEWEST_SAMPLES: f64 = 4.0;
 
 /// End of a picture: the first of these that holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,7 +29,7 @@ impl Goal {
 
     /// Whether there is time for pilots beside the first samples of `pixels` pixels.
     pub fn affords_pilots(&self, pixels: usize) -> bool {
-        self.rays.is_none_or(|rays| rays > FEWEST_SAMPLES * RAYS_PER_SAMPLE * pixels as f64)
+        self.rays.is_none_or(|rays| rays > SAMPLES_OF_PILOTS * RAYS_PER_SAMPLE * pixels as f64)
     }
 
     /// Whether a trial costs little beside a picture of `pixels` pixels.
@@ -54,7 +42,7 @@ impl Goal {
     /// Pixels of a picture of `pixels` for each of the pilot of light paths: few where time alone ends it.
     pub fn part_of_pilot(&self, pixels: usize) -> usize {
         let Some(rays) = self.rays_alone() else { return pilot::PART };
-        let few = (PILOT_PIXELS * rays / RAYS_OF_PILOT_PIXEL).max(FEWEST_PILOT_PIXELS);
+        let few = (COUNTS_SHARE_OF_PIXELS * rays / COUNTS_RAYS_OF_PIXEL).max(COUNTS_FEWEST_PIXELS);
         ((pixels as f64 / few) as usize).max(1)
     }
 }

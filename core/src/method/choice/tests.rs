@@ -1,8 +1,13 @@
 //! Tests of the choice by predicted error.
 
+use super::trial::SUPPLIES;
 use super::*;
+use crate::cache::radiance::LobeSettings;
+use crate::method::MethodKind;
 use crate::method::counts::pilot;
+use crate::method::counts::prediction::Candidate;
 use crate::method::counts::rarity::Rarity;
+use crate::method::counts::{Choice, PilotNoise};
 
 const TRIAL: Trial = Trial {
     noise: [4.0, 0.1, 0.1],
@@ -11,35 +16,35 @@ const TRIAL: Trial = Trial {
     reuse: 1.0,
     pixels: 16384.0,
     triangles: 100,
-    resolution: None,
-    shards: 1.0,
+    caches: TrialCaches { resolution: None, shards: 1, lobes: LobeSettings::DEFAULT },
     has_photons: false,
 };
 
 const GOAL: Goal = Goal { rays: Some(9e7), samples: None, error: None };
 
 /// Light paths with a tenth of the noise × work of path tracing, whose rare light is the `rest`.
-fn light_paths(rest: f32) -> Option<LightPaths> {
+fn light_paths(rest: f32) -> Choice {
     let [light_paths, paths, rest] = [2.0, 20.0, rest].map(Rarity::often);
     let noise = PilotNoise { light_paths, work: 5.0, rests: [paths, rest, rest], work_of_paths: 5.0 };
-    Some(LightPaths { noise, are_choice: true })
+    let counts = Candidate { light_paths: 1.0, connections: 1, merging: false };
+    Choice { counts, gain: Some(10.0), noise, ..Choice::paths("") }
 }
 
-fn without(found: Option<LightPaths>) -> Option<LightPaths> {
-    found.map(|found| LightPaths { are_choice: false, ..found })
+/// The same where light paths are no choice.
+fn without(rest: f32) -> Choice {
+    Choice { counts: Candidate::PATHS, ..light_paths(rest) }
 }
 
 #[test]
 fn rare_light_is_that_of_records_or_stays_with_paths() {
-    let best = |found| TRIAL.best(&GOAL, true, found).0;
-    let is_cache = |best| matches!(best, Best::Cache(_));
-    assert!(is_cache(best(None)));
-    assert!(is_cache(best(light_paths(0.05))), "records have the rare light");
-    assert_eq!(best(light_paths(20.0)), Best::LightPaths, "caustics are left to paths");
+    use MethodKind::{Bidirectional, IrradianceCache, Path};
+    let best = |found: Result<Choice, _>| TRIAL.table(&GOAL, None, found).best().kind;
+    assert_eq!(best(Err("")), IrradianceCache);
+    assert_eq!(best(Ok(light_paths(0.05))), IrradianceCache, "records have the rare light");
+    assert_eq!(best(Ok(light_paths(20.0))), Bidirectional, "caustics are left to paths");
     // The noise of path tracing is the same where light paths are no choice.
-    let others = without(light_paths(20.0));
-    assert_eq!(best(others), Best::Paths);
-    assert!(is_cache(best(without(light_paths(0.05)))));
+    assert_eq!(best(Ok(without(20.0))), Path);
+    assert_eq!(best(Ok(without(0.05))), IrradianceCache);
 }
 
 #[test]

@@ -14,23 +14,12 @@ use self::prediction::{CANDIDATES, Candidate, Given};
 use self::rarity::Rarity;
 use super::bidirectional::{Bidirectional, BidirectionalSettings};
 use super::caustics;
+use super::tuned::{CAUSTIC_LIGHT, LEAST_GAIN, REUSE_GAIN};
 use super::{Executor, RenderContext};
 use crate::bsdf::Features;
 use crate::census::Census;
 use crate::findings::{Decision, Finding, Findings, Value};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
-
-/// Least ratio of noise × work of path tracing to that of other counts for which they are chosen: the pilot
-/// is noisy.
-const LEAST_GAIN: f32 = 1.15;
-
-/// Gain of path reuse at most, that of the ablation: its own pilot misses rare light, which reuse does not
-/// help, and promises up to 10.
-pub(super) const REUSE_GAIN: f64 = 2.5;
-
-/// Share of the light in caustics from which on the photons of path tracing are its means: 0.28 to 0.97 in
-/// caustic scenes, 0.08 on veach-bidir, where light paths find more than caustics.
-const CAUSTIC_LIGHT: f64 = 0.15;
 
 /// Counts that suit a picture, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,7 +160,7 @@ impl Choice {
     }
 
     /// Path tracing alone, for a `reason`.
-    fn paths(reason: &'static str) -> Self {
+    pub(super) fn paths(reason: &'static str) -> Self {
         let without = "there are no light paths";
         Self {
             counts: Candidate::PATHS,
@@ -245,7 +234,7 @@ impl Choice {
     /// Path tracing for a `reason`, where the gain is too small. What the pilot has found stays.
     fn or_paths(self, reason: &'static str) -> Self {
         let Self { counts, light_paths, connections, merging, .. } = Self::paths(reason);
-        match self.gain <= Some(LEAST_GAIN) {
+        match self.gain <= Some(LEAST_GAIN as f32) {
             true => Self { counts, light_paths, connections, merging, ..self },
             false => self,
         }

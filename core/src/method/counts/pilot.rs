@@ -63,9 +63,6 @@ const WAYS: usize = CANDIDATES + RESTS + 1;
 /// Values of the pixels of a tile by each way, one sample less the other.
 const SUMS: usize = WAYS * PIXELS_PER_TILE;
 
-/// Least variance relative to the second moment: the estimate of the variance is noisy.
-const LEAST_VARIANCE: f32 = 0.05;
-
 /// Result of a pilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {

@@ -10,6 +10,7 @@
 //! Light that n′ finds seldom counts as much as it will in the long run, although a pilot with n′ would not
 //! see it.
 
+use crate::method::tuned::{CONNECTION, LIGHT_PATH_WEIGHTS, LIGHT_RAY, PHOTON, SHADOW_RAY};
 use crate::transport::bidirectional::contribution::{CLASSES, Class, Contribution, Rest};
 use bytemuck::{Pod, Zeroable};
 
@@ -160,18 +161,6 @@ pub struct Work {
     pub splats: f32,
 }
 
-/// Times relative to that of a ray of a camera path with all that is shaded at its end, measured in a
-/// Cornell box and on veach-bidir: a shadow ray with the BSDF at its start; a connection, which has two; a
-/// ray of a light path, whose vertex is stored; and MIS with light paths, a factor on the work of camera
-/// paths.
-const SHADOW_RAY: f32 = 0.5;
-const CONNECTION: f32 = 0.6;
-const LIGHT_RAY: f32 = 0.8;
-const SUMS: f32 = 1.15;
-
-/// Work for each ray of a light path of a photon map and of the queries in it.
-const PHOTON: f32 = 0.7;
-
 impl Work {
     /// Work of a sample of a pixel with these counts, in rays of camera paths.
     pub fn of(&self, candidate: &Candidate) -> f32 {
@@ -182,7 +171,7 @@ impl Work {
         let photons = if candidate.merging { PHOTON } else { 0.0 };
         let light_path = (LIGHT_RAY + photons) * self.light_rays + SHADOW_RAY * self.splats;
         let connections = CONNECTION * candidate.connections as f32 * self.connections;
-        SUMS * paths + connections + candidate.light_paths * light_path
+        LIGHT_PATH_WEIGHTS * paths + connections + candidate.light_paths * light_path
     }
 }
 

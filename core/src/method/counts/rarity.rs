@@ -1,14 +1,12 @@
 //! Noise by the rarity of light. Light that a picture finds only a few times is missing from it: its error
 //! is the square of its radiance, not its variance, which pictures of so few samples seldom show.
 
+use crate::method::tuned::LEAST_HITS;
 use bytemuck::{Pod, Zeroable};
 
 /// Classes of rarity, the rarest first; each is found eight times as often as the one before.
 const CLASSES: usize = 8;
 const OCTAVES: i32 = 3;
-
-/// Times that the paths of a picture find light, at least, for it to be noise.
-const LEAST_HITS: f64 = 4.0;
 
 /// Sums over the contributions to a block of pixels by one way to find light.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

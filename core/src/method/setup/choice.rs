@@ -1,18 +1,16 @@
-//! Choice of a method for a picture whose method is left open: path tracing, unless another one has less
-//! predicted error ([`crate::method::choice`]).
+//! Choice of a method for a picture whose method is left open ([`crate::method::choice`]).
 
-use super::{MethodKind, MethodPlan, MethodSetup, counts};
+use super::{MethodKind, MethodPlan, MethodSetup};
 use crate::bsdf::Features;
 use crate::census::Census;
 use crate::findings::Finding;
 use crate::memory::{MemorySource, OutOfMemory};
 use crate::method::bidirectional::BidirectionalSettings;
 use crate::method::caustics::CausticPathTracing;
-use crate::method::choice::{Best, LightPaths, Trial, TrialCaches};
-use crate::method::counts::Choice;
-use crate::method::{Executor, RenderMethod};
+use crate::method::choice::{Trial, TrialCaches};
+use crate::method::{Executor, RenderMethod, counts};
 
-/// Outcome of a choice: the plan of another method, and the reason.
+/// Outcome of a choice: the plan of another method than path tracing, and the table with the reason.
 pub(super) struct Chosen<'a, F> {
     pub(super) instead: Option<MethodPlan<'a, F>>,
     pub(super) finding: Finding,
@@ -36,35 +34,37 @@ pub(super) fn choose<'a: 'm, 'm, F: Features>(
     let merging = options.bidirectional.merging.or(Some(false));
     let techniques = BidirectionalSettings { merging, ..options.bidirectional };
     let light_paths = match trial.affords_light_paths(goal) {
+        false => Err("its pilot takes too much of the work"),
         true => {
-            let part = goal.part_of_pilot(context.pixels());
-            counts::choose::<F>(setup, (&techniques, part, trial.has_photons), memory, executor)?
+            let pilot = (&techniques, goal.part_of_pilot(context.pixels()), trial.has_photons);
+            let choice = counts::choose::<F>(context, pilot, &mut memory.within(), executor)?;
+            choice.ok_or("its counts are given, or there is no memory for a pilot")
         }
-        false => None,
     };
-    let findings = paths.findings();
     // Merges are biased, as caches are.
-    let light_paths = light_paths.filter(|choice| setup.is_audited || !choice.counts.merging);
-    let light_paths = light_paths.map(|choice| choice.beside(&findings));
-    let found = light_paths.filter(|choice| choice.gain.is_some());
-    let found =
-        found.map(|Choice { noise, counts, .. }| LightPaths { noise, are_choice: counts.light_paths > 0.0 });
-    let (best, finding) = trial.best(goal, setup.is_audited && may_have_cache(setup), found);
-    let instead = match (best, light_paths) {
-        (Best::Paths, _) | (Best::LightPaths, None) => None,
-        (Best::Cache(picture), _) => Some(MethodPlan::with_cache(MethodKind::IrradianceCache, picture)),
-        (Best::RadianceCache(picture), _) => Some(MethodPlan::with_cache(MethodKind::RadianceCache, picture)),
-        (Best::LightPaths, Some(choice)) => {
-            let merges = choice.counts.merging;
-            let kind = if merges { MethodKind::VertexMerging } else { MethodKind::Bidirectional };
+    let is_choice = |choice: &counts::Choice| setup.is_audited || !choice.counts.merging;
+    let light_paths = light_paths.and_then(|choice| match is_choice(&choice) {
+        true => Ok(choice.beside(&paths.findings())),
+        false => Err("nothing would measure its bias"),
+    });
+    let table = trial.table(goal, without_caches(setup), light_paths);
+    let best = *table.best();
+    let instead = match (best.kind, light_paths) {
+        (MethodKind::Path, _) => None,
+        (kind @ (MethodKind::Bidirectional | MethodKind::VertexMerging), Ok(choice)) => {
             Some(MethodPlan::with_counts(kind, choice))
         }
+        (kind, _) => Some(MethodPlan { picture: best.picture, ..kind.into() }),
     };
-    Ok(Some(Chosen { instead, finding }))
+    Ok(Some(Chosen { instead, finding: table.finding() }))
 }
 
-/// True if a cache could supply light of the scene.
-fn may_have_cache(setup: &MethodSetup) -> bool {
+/// A reason against caches.
+fn without_caches(setup: &MethodSetup) -> Option<&'static str> {
     let surfaces = Census::of(setup.context.scene).surfaces;
-    setup.context.settings.max_depth > 2 && surfaces.diffuse + surfaces.glossy > 0
+    match setup.context.settings.max_depth > 2 && surfaces.diffuse + surfaces.glossy > 0 {
+        _ if !setup.is_audited => Some("nothing would measure its bias"),
+        true => None,
+        false => Some("there is no indirect light of diffuse surfaces"),
+    }
 }

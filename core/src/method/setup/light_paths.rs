@@ -1,7 +1,6 @@
 //! Setup of bidirectional path tracing, light tracing, and vertex connection and merging. Path tracing takes
 //! their place where light paths do not pay.
 
-use super::counts::{choose, given};
 use super::{AnyMethod, Attempt, MethodKind, MethodPlan, MethodSetup, paths};
 use crate::bsdf::Features;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
@@ -11,7 +10,7 @@ use crate::method::{Executor, RenderMethod};
 
 /// Working memory of a worker for `plan`.
 pub(super) fn scratch<F: Features>(plan: &MethodPlan<F>, setup: &MethodSetup) -> Footprint {
-    let given = given(plan.kind, &setup.options.bidirectional);
+    let given = setup.options.bidirectional.of(plan.kind);
     match plan.counts {
         Some(choice) => Bidirectional::<F>::scratch(&choice.settings(&given, &setup.context)),
         None if plan.kind == MethodKind::LightTracing => Bidirectional::<F>::scratch(&given),
@@ -31,18 +30,21 @@ pub(super) fn set_up<'a: 'm, 'm, F: Features>(
     executor: &mut impl Executor,
 ) -> Result<Attempt<'a, 'm, F>, OutOfMemory> {
     let kind = plan.kind;
-    let given = given(kind, &setup.options.bidirectional);
-    let techniques = match (kind, plan.counts) {
-        (MethodKind::LightTracing, _) => given,
-        (_, Some(choice)) => choice.settings(&given, &setup.context),
-        (_, None) => match choose::<F>(setup, (&given, pilot::PART, false), memory, executor)? {
-            None => given,
+    let given = setup.options.bidirectional.of(kind);
+    let mut techniques = given;
+    if let Some(choice) = plan.counts.filter(|_| kind != MethodKind::LightTracing) {
+        techniques = choice.settings(&given, &setup.context);
+    } else if kind != MethodKind::LightTracing {
+        let pilot = (&given, pilot::PART, false);
+        let choice = counts::choose::<F>(&setup.context, pilot, &mut memory.within(), executor)?;
+        match choice {
+            None => (),
             Some(choice) if choice.gain.is_none() && choice.counts.light_paths > 0.0 => {
                 return Ok(Attempt::Instead(MethodPlan::with_counts(kind, choice)));
             }
             Some(choice) => return beside_paths(kind, choice, setup, memory, executor),
-        },
-    };
+        }
+    }
     let reserve = setup.reserve(kind);
     let method = Bidirectional::new(&setup.context, &techniques, memory, executor, reserve)?;
     Ok(Attempt::Ready(plan.chosen(AnyMethod::LightPaths(method))))

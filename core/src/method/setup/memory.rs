@@ -55,7 +55,7 @@ impl Unbuilt<'_> {
                 ProgressivePhotonMapping::<F>::footprint(pixels, &options.photons).and(guide)
             }
             MethodKind::LightTracing | MethodKind::Bidirectional | MethodKind::VertexMerging => {
-                let counts = super::counts::given(kind, &options.bidirectional);
+                let counts = options.bidirectional.of(kind);
                 let usual = Bidirectional::<F>::usual_footprint(scene, size, &counts);
                 let pilot = match counts.is_complete() || kind == MethodKind::LightTracing {
                     true => Footprint::default(),
@@ -115,7 +115,7 @@ impl Unbuilt<'_> {
             MethodKind::PhotonMap => PhotonMapping::<F>::scratch(),
             MethodKind::ProgressivePhotons => ProgressivePhotonMapping::<F>::scratch(),
             MethodKind::LightTracing | MethodKind::Bidirectional | MethodKind::VertexMerging => {
-                let counts = super::counts::given(kind, &self.options.bidirectional);
+                let counts = self.options.bidirectional.of(kind);
                 let bidirectional = Bidirectional::<F>::scratch(&counts);
                 match kind {
                     MethodKind::LightTracing => bidirectional,

@@ -1,7 +1,6 @@
 //! Setup of a method: prepasses choose what is left open, then the method takes its memory.
 
 mod choice;
-mod counts;
 mod light_paths;
 mod memory;
 mod paths;
@@ -190,11 +189,6 @@ impl<'a, F: Features> MethodPlan<'a, F> {
     /// Kind of the method.
     pub fn kind(&self) -> MethodKind {
         self.kind
-    }
-
-    /// A method with a cache that suits the predicted `picture`.
-    fn with_cache(kind: MethodKind, picture: CachedPicture) -> Self {
-        Self { picture: Some(picture), ..kind.into() }
     }
 
     /// A bidirectional method with the counts of `choice`.

@@ -143,6 +143,10 @@ const mapsNote = ({ samples: [least, most], error }) => {
 
 // Value of a finding, whose unit follows from its name.
 const findingText = (topic, name, value) => {
+  if (value instanceof Object) {
+    const { error, rays_per_sample: work, reason } = value;
+    return error === null ? `no choice: ${reason}` : `relMSE ${number(error)}, ${number(work)} rays a sample: ${reason}`;
+  }
   if (typeof value !== "number") return String(value);
   if (name === "seconds") return duration(value);
   const isFraction = /^(share|useful|accepted|covered|predicted|achieved|rms)/.test(name);

@@ -1,13 +1,12 @@
 //! Sums of the pilot over blocks of pixels: noise and work of all candidates.
 
-use super::{
-    BLOCK, Block, CONNECTIONS, Found, LEAST_VARIANCE, LIST, Pilot, RESTS, SAMPLE, WEIGHTINGS, Weighting,
-};
+use super::{BLOCK, Block, CONNECTIONS, Found, LIST, Pilot, RESTS, SAMPLE, WEIGHTINGS, Weighting};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::PIXELS_PER_TILE;
 use crate::method::counts::prediction::{CANDIDATES, Candidate, Reweighted, Weighed, Work};
 use crate::method::counts::rarity::{Rarity, is_often};
+use crate::method::tuned::LEAST_VARIANCE;
 use crate::transport::Counters;
 use crate::transport::bidirectional::contribution::{Class, Contribution, Rest};
 use crate::transport::bidirectional::light_pass::{PATHS_PER_TASK, marked};

@@ -1,0 +1,139 @@
+//! Predicted errors of paths, caches and light paths, by a trial and a pilot of counts. The difference of the
+//! variances without and with records, divided by the gather rays of a record, is the noise of interpolated
+//! light; it includes the difference of the estimators of direct light.
+
+use super::Goal;
+use super::table::{Row, Table};
+use super::trial::{IRRADIANCE, RADIANCE, SUPPLIES, Trial};
+use crate::method::cache_resolution::{CacheResolution, CachedPicture};
+use crate::method::counts::{self, PilotNoise};
+use crate::method::tuned::{
+    CACHED_RAY, COUNTS_RAYS, COUNTS_SHARE, FILLING_OF_LOBES, LEAST_GAIN, LEAST_GAIN_OF_LOBES,
+    LIGHT_PATHS_ERROR, PHOTONS_ERROR,
+};
+use crate::method::{MethodKind, work_of_detail};
+
+/// Candidates.
+pub const ROWS: usize = 4;
+
+impl Trial {
+    /// Work for each pixel that reaches `goal` by path tracing, in rays.
+    fn budget(&self, goal: &Goal) -> f64 {
+        let time = goal.rays.map(|rays| rays / self.pixels);
+        let samples = goal.samples.map(|samples| f64::from(samples) * self.work[0]);
+        let error = goal.error.map(|error| self.error_of_paths(1.0) / error);
+        [time, samples, error].into_iter().flatten().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the pilot of light paths costs little beside the picture.
+    pub fn affords_light_paths(&self, goal: &Goal) -> bool {
+        self.budget(goal) * self.pixels > COUNTS_RAYS / COUNTS_SHARE
+    }
+
+    /// relMSE of path tracing after so much work for each pixel.
+    fn error_of_paths(&self, work: f64) -> f64 {
+        self.reuse * self.noise[0] * self.work[0] / work
+    }
+
+    /// Row of a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
+    /// `noise` is that of samples of each.
+    fn cached(&self, supply: usize, work: f64, noise: &[f64; SUPPLIES]) -> Row {
+        let work_of_sample = CACHED_RAY * work_of_detail(self.triangles) * self.work[supply];
+        let pixels = self.pixels / f64::from(self.caches.shards);
+        let picture = CachedPicture {
+            rays: work * pixels,
+            samples: noise[supply] * work_of_sample * pixels,
+            gathered: (noise[0] - noise[supply]).max(0.0),
+        };
+        let (kind, of_lobes) = match supply {
+            IRRADIANCE => (MethodKind::IrradianceCache, 1.0),
+            _ => (MethodKind::RadianceCache, FILLING_OF_LOBES),
+        };
+        let filling = |resolution: CacheResolution| {
+            of_lobes * resolution.predicted_filling(self.pixels, self.triangles)
+        };
+        let chosen = || picture.resolution(filling(CacheResolution::COARSEST));
+        let resolution = self.caches.resolution.unwrap_or_else(chosen);
+        Row {
+            error: picture.error_after(&resolution, filling(resolution)),
+            work: work_of_sample,
+            least_gain: LEAST_GAIN_OF_LOBES,
+            picture: Some(picture),
+            ..Row::without(kind, "noise of a trial without the light of records")
+        }
+    }
+
+    /// All candidates for `goal`. `without_caches` is a reason against caches; `light_paths` are the counts
+    /// of a pilot, or the reason for none.
+    pub fn table(
+        &self,
+        goal: &Goal,
+        without_caches: Option<&'static str>,
+        light_paths: Result<counts::Choice, &'static str>,
+    ) -> Table<ROWS> {
+        use MethodKind::{Bidirectional, IrradianceCache, Path, RadianceCache, VertexMerging};
+        if self.noise[0] <= 0.0 {
+            let reason = "paths show no noise";
+            let others =
+                [IrradianceCache, RadianceCache, Bidirectional].map(|kind| Row::without(kind, reason));
+            let [first, second, third] = others;
+            return Table([Row { error: 0.0, ..Row::without(Path, reason) }, first, second, third]);
+        }
+        let work = self.budget(goal);
+        let samples_of = |rays: f32| work / f64::from(rays);
+        let found = light_paths.ok().filter(|choice| choice.gain.is_some());
+        let pilot: Option<PilotNoise> = found.map(|choice| choice.noise);
+        let factor = if self.has_photons { PHOTONS_ERROR } else { 1.0 };
+        let of_trial = self.error_of_paths(work);
+        // The pilot of light paths finds light that the few paths of the trial miss.
+        let of_pilot = pilot.map_or(0.0, |noise| {
+            noise.rests[0].error(samples_of(noise.work_of_paths) / self.reuse, self.pixels)
+        });
+        let paths = Row {
+            error: (factor * of_trial).max(of_pilot),
+            work: self.work[0],
+            least_gain: LEAST_GAIN,
+            ..Row::without(
+                Path,
+                match of_pilot > factor * of_trial {
+                    true => "rare light by the pilot of light paths",
+                    false => "noise of a trial",
+                },
+            )
+        };
+        // Rare light is that of records or of the rest.
+        let noise = core::array::from_fn(|i| match (i, pilot) {
+            (0, _) => self.noise[0] * paths.error / of_trial,
+            (_, None) => factor * self.noise[i],
+            (_, Some(noise)) => {
+                let samples = work / self.work[i];
+                (factor * self.noise[i]).max(samples * noise.rests[i].error(samples, self.pixels))
+            }
+        });
+        let without_lobes = (!self.has_lobes).then_some("records serve no lobe of the scene");
+        let cached = |supply, without: Option<_>| {
+            let row = self.cached(supply, work, &noise);
+            without.map_or(row, |reason| Row::without(row.kind, reason))
+        };
+        let merges = light_paths.is_ok_and(|choice| choice.counts.merging);
+        let kind = if merges { VertexMerging } else { Bidirectional };
+        let light_paths = match (found, light_paths) {
+            (Some(choice), _) if choice.counts.light_paths > 0.0 => Row {
+                error: choice
+                    .noise
+                    .light_paths
+                    .error(samples_of(choice.noise.work) / LIGHT_PATHS_ERROR, self.pixels),
+                work: choice.noise.work.into(),
+                ..Row::without(kind, choice.light_paths)
+            },
+            (_, Ok(choice)) => Row::without(kind, choice.light_paths),
+            (_, Err(reason)) => Row::without(kind, reason),
+        };
+        Table([
+            paths,
+            cached(IRRADIANCE, without_caches),
+            cached(RADIANCE, without_caches.or(without_lobes)),
+            light_paths,
+        ])
+    }
+}
