@@ -53,8 +53,8 @@ impl Face {
         self.low.abs().max(self.high.abs()).max_element()
     }
 
-    /// Calls `each` with the keys of the rounded plane, equal on both sides; several where rounding may decide
-    /// for another.
+    /// Calls `each` with the keys of the rounded plane, equal on both sides; several where rounding may
+    /// decide for another.
     pub(super) fn for_each_plane(&self, mut each: impl FnMut(u64)) {
         let longest = (self.high - self.low).length();
         let tilt = 2.0 * MOST_ERRORS * ROUNDING * self.coordinates() * longest / self.area;

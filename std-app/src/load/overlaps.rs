@@ -45,7 +45,7 @@ pub(super) fn locate(geometry: &Geometry, materials: &[Material]) -> Vec<Pair> {
         .enumerate()
         .map(|(number, chunk)| keys(chunk, (number * CHUNK) as u32))
         .collect();
-    let mut planes = keys.concat();
+    let mut planes = shared(&keys);
     drop(keys);
     planes.par_sort_unstable();
     let differ = |a: u32, b: u32| differ(&triangles[a as usize], &triangles[b as usize]);
@@ -71,6 +71,16 @@ pub(super) fn locate(geometry: &Geometry, materials: &[Material]) -> Vec<Pair> {
     pairs.par_sort_unstable_by_key(|pair| pair.triangles);
     pairs.dedup_by_key(|pair| pair.triangles);
     pairs
+}
+
+/// The entries of `keys` that have a key more than once, and a few others: sorting all takes longer.
+fn shared(keys: &[Vec<(u64, u32)>]) -> Vec<(u64, u32)> {
+    let slots = (4 * keys.iter().map(Vec::len).sum::<usize>()).next_power_of_two();
+    let slot = |key: u64| key as usize & (slots - 1);
+    let mut counts = vec![0u8; slots];
+    let all = || keys.iter().flatten().copied();
+    all().for_each(|(key, _)| counts[slot(key)] = counts[slot(key)].saturating_add(1));
+    all().filter(|(key, _)| counts[slot(*key)] > 1).collect()
 }
 
 /// The pairs in both orders, ascending, for the core.
