@@ -7,7 +7,9 @@
 //! 2. the normal at the photon is close to the normal of the place;
 //! 3. the photon arrived from the side to which the normal points.
 //!
-//! With a limit of length, a fourth rejects photons whose path would become too long. The tests need no normalised vectors: octahedral coordinates are integers, and the tests compare squares.
+//! With a limit of length, a fourth rejects photons whose path would become too long.
+//!
+//! The tests need no normalised vectors: octahedral coordinates are integers, and the tests compare squares.
 //!
 //! The same traversal also estimates the density over finer discs, of half the radius and less. They serve
 //! places where photons are dense, and they show the blur of the whole disc

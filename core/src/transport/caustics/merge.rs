@@ -184,8 +184,8 @@ impl<'a> CausticMerging<'a> {
     }
 
     /// Radiance towards `wo` from the photons around `point`. `travelled` is the length of the path from the
-    /// camera, or zero behind a receiver. `remaining` segments are those that the path of a photon has left at
-    /// least. `rotation` is that of the boundary rays, in turns.
+    /// camera, or zero behind a receiver. `remaining` segments are those that the path of a photon has left
+    /// at least. `rotation` is that of the boundary rays, in turns.
     #[inline]
     fn reflected<F: Features>(
         &self,

@@ -78,9 +78,9 @@ impl<'a> PhotonLight<'a> {
     }
 
     /// Radiance of reflected light from `point` to `wo`, at the end of a path of length `travelled` from the
-    /// camera; `None` if surfaces like `bsdf` store no photons. `remaining` segments are those that the path of
-    /// a photon has left at least. `rotation`, from 0 to 1, rotates the probes for walls, which are not counted
-    /// as rays.
+    /// camera; `None` if surfaces like `bsdf` store no photons. `remaining` segments are those that the path
+    /// of a photon has left at least. `rotation`, from 0 to 1, rotates the probes for walls, which are not
+    /// counted as rays.
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
