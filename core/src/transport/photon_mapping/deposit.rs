@@ -155,8 +155,8 @@ pub struct VisiblePhoton {
     pub path: usize,
     /// Cell of the emission guide.
     pub cell: u32,
-    /// Luminance of its power in W.
-    pub power: f32,
+    /// Luminance of its power in W, or of its light in the picture, up to a factor.
+    pub light: f32,
 }
 
 /// Visitor that reports photons near visible points.
@@ -181,14 +181,13 @@ impl Visitor for VisibilityCounter<'_> {
         vertex: &Vertex,
         _: &mut Counters,
     ) -> Option<Continuation> {
-        let stores = self.keep.stores(state, vertex);
-        if stores && self.sight.contains(vertex.point.position, vertex.point.geometric_normal) {
-            let power = luminance(Rgb::from(state.power));
-            (self.seen)(VisiblePhoton {
-                path: state.number as usize % PATHS_PER_TASK,
-                cell: state.cell,
-                power,
-            });
+        if self.keep.stores(state, vertex) {
+            let importance = self.sight.importance(vertex.point.position, vertex.point.geometric_normal);
+            let light = luminance(Rgb::from(state.power)) * importance;
+            if light > 0.0 {
+                let path = state.number as usize % PATHS_PER_TASK;
+                (self.seen)(VisiblePhoton { path, cell: state.cell, light });
+            }
         }
         self.keep.continuation(vertex)
     }
