@@ -9,10 +9,10 @@ use super::buffers::Geometry;
 pub(super) use super::coplanar::Pair;
 use super::coplanar::{Face, MOST_ERRORS, longest_axis};
 use super::notes::Notes;
+use core::cell::OnceCell;
 use glam::Vec3;
 use halflight_core::scene::{Material, Overlap, Surface, Triangle};
 use rayon::prelude::*;
-use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// Triangles, and planes, of a task.

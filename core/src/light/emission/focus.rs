@@ -104,8 +104,9 @@ impl Entrance {
         self.focus > 0.0
     }
 
-    /// Start of the line along unit `way` through a `point` of the disc, relative to its centre; `None` if the
-    /// line misses the scene. Focused lines start close to the scene's box: far away, rounding would bend them.
+    /// Start of the line along unit `way` through a `point` of the disc, relative to its centre; `None` if
+    /// the line misses the scene. Focused lines start close to the scene's box: far away, rounding would
+    /// bend them.
     pub(super) fn start(&self, way: Vec3, point: Vec2) -> Option<Vec3> {
         let frame = Frame::from_normal(way);
         if !self.is_focused() {
