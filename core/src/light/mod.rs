@@ -13,7 +13,7 @@ mod tree;
 
 pub(crate) use choice::ChosenLight;
 pub(crate) use emission::LightType;
-pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, EmissionSample, EmissionSampler, GuideStats};
+pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, EmissionSample, EmissionSampler, Focus, GuideStats};
 pub use emitted::emitted;
 pub use environment_visibility::{
     Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable, WarpedSample,

@@ -86,8 +86,7 @@ pub(super) fn footprint(lights: usize, size: [u32; 2], filter: PhotonFilter) -> 
 impl<'m> EmissionGuide<'m> {
     /// Lights by power.
     fn by_power(context: &RenderContext, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, ref bvh, ref lights, .. } = *context;
-        let emission = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
+        let emission = context.emission(arena)?;
         Ok(Self { emission, seen: None, by_power: None })
     }
 
@@ -129,6 +128,7 @@ impl<'m> EmissionGuide<'m> {
                 Target::Visible(pixels) => VisiblePoints::new(&map, &sampler, context.radii(), pixels, level),
                 Target::Gathered(radius) => VisiblePoints::within(&map, radius, level),
             };
+            let points = points.by_area(guide.emission.is_focused());
             let mut pilot = Pilot::new(context, (filter, max_depth), points, paths);
             guide.train::<F>(&mut stats, &mut arena, &mut pilot, executor)
         })?;
@@ -224,7 +224,7 @@ struct Pilot<'p, 'a> {
     points: VisiblePoints<'p>,
     /// The guide's cell of each path.
     cells: &'p mut [u32],
-    /// W: luminance of the photons of each path near visible points.
+    /// Benefit of the photons of each path near visible points.
     powers: &'p mut [f32],
 }
 
@@ -233,7 +233,7 @@ struct Pilot<'p, 'a> {
 struct Outcome {
     /// Light paths that leave photons near visible points.
     count: usize,
-    /// Mean squared power of a path there over the square of its mean.
+    /// Mean squared benefit of a path there over the square of its mean.
     spread: f64,
 }
 
@@ -279,7 +279,7 @@ impl<'p, 'a> Pilot<'p, 'a> {
                 // All photons of a path come from one cell.
                 if let (Some(cell), Some(power)) = (cells.get_mut(photon.path), powers.get_mut(photon.path)) {
                     *cell = photon.cell;
-                    *power += photon.power;
+                    *power += photon.light;
                 }
             })
         })?;

@@ -110,9 +110,9 @@ impl HiddenLight {
         if !Self::is_possible::<F>(context) || !memory.has(footprint) {
             return Ok(None);
         }
-        let RenderContext { scene, bvh, lights, settings, .. } = *context;
+        let RenderContext { scene, lights, settings, .. } = *context;
         memory.lend("hidden light", footprint, |_, arena| {
-            let by_power = EmissionSampler::build(scene, &lights, &bvh.bounds(), arena)?;
+            let by_power = context.emission(arena)?;
             let Some(stats) = GuideStats::aimed(scene, &lights, &by_power, arena)? else { return Ok(None) };
             let emission = stats.guide(&by_power, arena)?;
             let raster = raster(context);

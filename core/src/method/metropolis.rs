@@ -93,10 +93,9 @@ impl<'a, F: Features> Metropolis<'a, F> {
         executor: &mut impl Executor,
         others: usize,
     ) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, ref bvh, ref lights, settings: paths, .. } = *context;
+        let RenderContext { ref lights, settings: paths, .. } = *context;
         let footprint = EmissionSampler::footprint(lights.count());
-        let emission =
-            EmissionSampler::build(scene, lights, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;
+        let emission = context.emission(&mut memory.take("emission", footprint)?)?;
         let pixels = Tile::count(paths.width, paths.height) * PIXELS_PER_TILE;
         let footprint = Footprint::default().slice::<[f32; 3]>(pixels).slice::<f32>(pixels / CELL);
         let mut arena = memory.take("splats", footprint)?;

@@ -56,10 +56,11 @@ use crate::Level;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
 use crate::findings::Findings;
-use crate::light::LightSampler;
-use crate::memory::OutOfMemory;
+use crate::light::{EmissionSampler, LightSampler};
+use crate::memory::{Arena, OutOfMemory};
 use crate::photon::PhotonMap;
 use crate::scene::Scene;
+use crate::transport::photon_mapping::focus::visible_focus;
 use crate::transport::{PathIntegrator, PathSettings, RadiusSchedule, SceneContext};
 
 /// A scene with the structures that all methods share, and the settings of its paths.
@@ -94,6 +95,13 @@ impl<'a> RenderContext<'a> {
     pub fn radii(&self) -> RadiusSchedule {
         let size = [self.settings.width, self.settings.height];
         RadiusSchedule::new((self.scene, &self.bvh), size, self.level)
+    }
+
+    /// Emission of photons by power, in an arena of [`EmissionSampler::footprint`].
+    pub(crate) fn emission<'m>(&self, arena: &mut Arena<'m>) -> Result<EmissionSampler<'m>, OutOfMemory> {
+        let focus =
+            visible_focus((self.scene, &self.bvh), [self.settings.width, self.settings.height], self.level);
+        EmissionSampler::build_around(self.scene, &self.lights, (&self.bvh.bounds(), focus), arena)
     }
 
     /// Pixels of the picture.

@@ -35,7 +35,8 @@ pub fn gather<R: Response>(map: &PhotonMap, disc: &QueryDisc, response: &R) -> D
         let flat = (place - photon.position()).dot(disc.normal).abs() <= thickness;
         let alike = photon.normal_in_steps().length_squared() * (MIN_NORMAL_COSINE * MIN_NORMAL_COSINE)
             <= along * along;
-        if flat && alike && along > 0.0 && photon.direction_in_steps().dot(disc.normal) > 0.0 {
+        let is_short = photon.remaining() >= map.least_remaining;
+        if is_short && flat && alike && along > 0.0 && photon.direction_in_steps().dot(disc.normal) > 0.0 {
             let arrives = photon.power() * response.of(photon.direction());
             let weight = |squared_radius: f32| {
                 let squared = (distance * (1.0 / squared_radius).min(f32::MAX)).min(1.0);

@@ -32,7 +32,7 @@ pub(super) fn build<'m, J: ForkJoin>(
     let nodes = &mut nodes[..levels.nodes];
     next(leaves, kept, &mut nodes[..levels.at(1, 0).min(levels.nodes)], join);
     bound(nodes, &levels);
-    PhotonMap { leaves, nodes, levels, count: kept, refused: offered - kept, space }
+    PhotonMap { leaves, nodes, levels, count: kept, refused: offered - kept, space, least_remaining: 0 }
 }
 
 /// Moves the photons of finite places to the front, in units of the map. Returns their number.

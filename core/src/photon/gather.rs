@@ -7,6 +7,8 @@
 //! 2. the normal at the photon is close to the normal of the place;
 //! 3. the photon arrived from the side to which the normal points.
 //!
+//! With a limit of length, a fourth rejects photons whose path would become too long.
+//!
 //! The tests need no normalised vectors: octahedral coordinates are integers, and the tests compare squares.
 //!
 //! The same traversal also estimates the density over finer discs, of half the radius and less. They serve
@@ -18,7 +20,7 @@ use super::kernel::{Kernel, QueryDisc};
 use super::kernel_boundary::{KernelBoundary, splat};
 use super::layout::{HALVES, Leaf};
 use super::range::{Visit, leaves_within};
-use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS};
+use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS, REMAINING_BITS};
 use crate::Rgb;
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -153,6 +155,8 @@ pub(super) struct DiscTest<'a, S: Simd> {
     limit: S::F16,
     normal: [S::F16; 3],
     thickness: S::F16,
+    /// Least number of segments that the path of a photon has left; `None` if any will do.
+    remaining: Option<S::F16>,
     boundary: Option<&'a KernelBoundary>,
 }
 
@@ -175,6 +179,7 @@ impl<'a, S: Simd> DiscTest<'a, S> {
             limit: simd.splat16(squared_radius),
             normal: splat(simd, disc.normal),
             thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
+            remaining: (map.least_remaining > 0).then(|| simd.splat16(map.least_remaining as f32)),
             boundary,
         })
     }
@@ -205,6 +210,15 @@ impl<'a, S: Simd> DiscTest<'a, S> {
         let counted = in_disc & alike & zero.lt(dot(came, self.normal));
         let counted = match self.boundary {
             Some(boundary) => counted & boundary.contains(simd, offset, distance, self.squared_radius),
+            None => counted,
+        };
+        let counted = match self.remaining {
+            Some(least) => {
+                let power = &leaf.power[half % HALVES];
+                let low = simd.field16(power, 0, REMAINING_BITS);
+                let high = simd.field16(power, POWER_BITS, REMAINING_BITS);
+                counted & least.le(low + high * simd.splat16((1 << REMAINING_BITS) as f32))
+            }
             None => counted,
         };
         counted.any().then_some((distance, came, counted))

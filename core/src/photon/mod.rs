@@ -24,7 +24,7 @@ pub use kernel::{Kernel, QueryDisc};
 pub use kernel_boundary::{KernelBoundary, PROBES};
 pub use morton::QueryOrder;
 pub use nearest::Neighbours;
-pub use record::Photon;
+pub use record::{MOST_REMAINING, Photon};
 
 use crate::Level;
 use crate::bvh::{ForkJoin, Serial};
@@ -87,6 +87,8 @@ pub struct PhotonMap<'m> {
     count: usize,
     refused: usize,
     space: Space,
+    /// Segments that the paths of photons of a density estimate have left at least.
+    least_remaining: u32,
 }
 
 /// Everything of a map except the memory that holds it.
@@ -118,11 +120,17 @@ impl<'m> PhotonMap<'m> {
         let (leaves, nodes): (&[Leaf], &[Node]) = (leaves, nodes);
         let leaves = leaves.get(..count.div_ceil(LEAF)).ok_or(short)?;
         let nodes = nodes.get(..levels.nodes).ok_or(short)?;
-        Ok(Self { leaves, nodes, levels, count, refused, space })
+        Ok(Self { leaves, nodes, levels, count, refused, space, least_remaining: 0 })
     }
 }
 
 impl PhotonMap<'_> {
+    /// This map for density estimates of the photons whose paths have `segments` segments left, besides one.
+    /// All photons were stored by paths of limited length unless `segments` is 0.
+    pub(crate) fn with_remaining(self, segments: u32) -> Self {
+        Self { least_remaining: segments, ..self }
+    }
+
     /// Number of photons.
     pub fn len(&self) -> usize {
         self.count

@@ -25,6 +25,12 @@ impl PathSettings {
     pub fn is_limited(&self) -> bool {
         self.max_depth != UNLIMITED
     }
+
+    /// Segments that the path of a photon has to have left, besides one, behind a camera path of so many
+    /// `segments`: none if paths have any length.
+    pub(crate) fn extra_segments(&self, segments: u32) -> u32 {
+        if self.is_limited() { segments - 1 } else { 0 }
+    }
 }
 
 /// Counters of work.

@@ -6,6 +6,7 @@
 //! arbitrary bytes: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
 
 mod buffers;
+mod coplanar;
 mod duplicate_emitters;
 mod error;
 mod far_camera;

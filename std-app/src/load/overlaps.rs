@@ -6,21 +6,17 @@
 //! until few are left, which are compared in pairs.
 
 use super::buffers::Geometry;
+pub(super) use super::coplanar::Pair;
+use super::coplanar::{Face, MOST_ERRORS, longest_axis};
 use super::notes::Notes;
-use glam::{DVec2, DVec3};
-use halflight_core::sampling::mix;
+use core::cell::OnceCell;
+use glam::Vec3;
 use halflight_core::scene::{Material, Overlap, Surface, Triangle};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Relative error of a coordinate that is rounded to f32.
-const ROUNDING: f64 = 0.5 * f32::EPSILON as f64;
-/// Distance of a corner from the plane of another triangle, in rounding errors of the coordinates.
-const MOST_ERRORS: f64 = 2.0;
-/// Smallest part of the smaller triangle that counts as an overlap. Neighbours overlap by rounding.
-const LEAST_PART: f64 = 1e-3;
-/// Steps of a component of a normal, and of the distance of a plane from the origin.
-const STEPS: [f64; 4] = [512.0, 512.0, 512.0, 2048.0];
+/// Triangles, and planes, of a task.
+const CHUNK: usize = 1 << 12;
 /// Triangles that are compared without a further split.
 const FEW: usize = 16;
 /// Most pairs of triangles in one plane that are compared after the last split.
@@ -29,32 +25,62 @@ const MOST_PAIRS: usize = 1 << 24;
 /// Pairs of triangles that overlap in one plane and differ, ascending.
 pub(super) fn locate(geometry: &Geometry, materials: &[Material]) -> Vec<Pair> {
     let Geometry { triangles, positions, .. } = geometry;
-    let differ =
-        |a: &Triangle, b: &Triangle| a.material != b.material || !is_plain(&materials[a.material as usize]);
+    let plain: Vec<bool> = materials.iter().map(is_plain).collect();
+    let differ = |a: &Triangle, b: &Triangle| a.material != b.material || !plain[a.material as usize];
     if triangles.windows(2).all(|pair| !differ(&pair[0], &pair[1])) {
         return Vec::new();
     }
     let face = |index: u32| Face::new(index, &triangles[index as usize], positions);
-    let keys =
-        |index: u32| face(index).into_iter().flat_map(move |face| face.planes().map(move |key| (key, index)));
-    let mut planes: Vec<(u64, u32)> =
-        (0..triangles.len() as u32).into_par_iter().flat_map_iter(keys).collect();
+    let keys = |chunk: &[Triangle], first: u32| {
+        let mut keys = Vec::with_capacity(chunk.len() + chunk.len() / 8);
+        for (index, triangle) in (first..).zip(chunk) {
+            if let Some(face) = Face::new(index, triangle, positions) {
+                face.for_each_plane(|key| keys.push((key, index)));
+            }
+        }
+        keys
+    };
+    let keys: Vec<Vec<(u64, u32)>> = triangles
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(number, chunk)| keys(chunk, (number * CHUNK) as u32))
+        .collect();
+    let mut planes = shared(&keys);
+    drop(keys);
     planes.par_sort_unstable();
-    let groups: Vec<&[(u64, u32)]> =
-        planes.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1).collect();
-    let search = |group: &&[(u64, u32)]| {
-        let indices: Vec<u32> = group.iter().map(|&(_, index)| index).collect();
-        let differ = |a: u32, b: u32| differ(&triangles[a as usize], &triangles[b as usize]);
+    let differ = |a: u32, b: u32| differ(&triangles[a as usize], &triangles[b as usize]);
+    let is_mixed = |group: &&[(u64, u32)]| group.windows(2).any(|pair| differ(pair[0].1, pair[1].1));
+    let groups: Vec<&[(u64, u32)]> = planes.chunk_by(|a, b| a.0 == b.0).filter(is_mixed).collect();
+    let boxed = |&(_, index): &(u64, u32)| Boxed::new(index, &triangles[index as usize], positions);
+    let search = |groups: &[&[(u64, u32)]]| {
         let mut pairs = Vec::new();
-        if indices.windows(2).any(|pair| differ(pair[0], pair[1])) {
-            collect(&face, indices, &differ, &mut pairs);
+        for group in groups {
+            // Most planes have the two halves of a rectangle.
+            if let [first, second] = group {
+                let (a, b) = (boxed(first), boxed(second));
+                if a.is_near(&b) && a.index != b.index {
+                    pairs.extend(face(a.index).zip(face(b.index)).and_then(|(a, b)| a.overlap(&b)));
+                }
+            } else {
+                collect(&face, group.iter().map(boxed).collect(), &differ, &mut pairs);
+            }
         }
         pairs
     };
-    let mut pairs: Vec<Pair> = groups.par_iter().flat_map_iter(search).collect();
+    let mut pairs = groups.par_chunks(CHUNK).map(search).collect::<Vec<_>>().concat();
     pairs.par_sort_unstable_by_key(|pair| pair.triangles);
     pairs.dedup_by_key(|pair| pair.triangles);
     pairs
+}
+
+/// The entries of `keys` that have a key more than once, and a few others: sorting all takes longer.
+fn shared(keys: &[Vec<(u64, u32)>]) -> Vec<(u64, u32)> {
+    let slots = (4 * keys.iter().map(Vec::len).sum::<usize>()).next_power_of_two();
+    let slot = |key: u64| key as usize & (slots - 1);
+    let mut counts = vec![0u8; slots];
+    let all = || keys.iter().flatten().copied();
+    all().for_each(|(key, _)| counts[slot(key)] = counts[slot(key)].saturating_add(1));
+    all().filter(|(key, _)| counts[slot(*key)] > 1).collect()
 }
 
 /// The pairs in both orders, ascending, for the core.
@@ -83,165 +109,70 @@ fn is_plain(material: &Material) -> bool {
     is_constant && !material.emits() && !material.has_cutout() && material.normal_map.is_none()
 }
 
-/// Two triangles that overlap.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pair {
-    /// Indices, ascending.
-    pub(super) triangles: [u32; 2],
-    /// Their fronts are on the same side.
-    pub(super) same_front: bool,
-    /// Part of each that the other covers.
-    pub(super) covered: [f64; 2],
-}
-
 /// Covered part of a triangle that counts as all of it.
 pub(super) const ALL: f64 = 0.999;
 
-/// A triangle in its plane.
-struct Face {
+/// The box of a triangle, with a margin for rounding.
+#[derive(Clone, Copy)]
+struct Boxed {
     index: u32,
-    corners: [DVec3; 3],
-    normal: DVec3,
-    /// Twice the area.
-    area: f64,
-    /// Its box, with a margin for rounding.
-    low: DVec3,
-    high: DVec3,
+    low: Vec3,
+    high: Vec3,
 }
 
-impl Face {
-    fn new(index: u32, triangle: &Triangle, positions: &[[f32; 3]]) -> Option<Self> {
-        let corners = triangle.vertices.map(|v| DVec3::from(positions[v as usize].map(f64::from)));
-        let [p, q, r] = corners;
-        let area = (q - p).cross(r - p);
-        let normal = area.try_normalize()?;
+impl Boxed {
+    fn new(index: u32, triangle: &Triangle, positions: &[[f32; 3]]) -> Self {
+        let [p, q, r] = triangle.vertices.map(|v| Vec3::from(positions[v as usize]));
         let (low, high) = (p.min(q).min(r), p.max(q).max(r));
-        let slack = DVec3::splat(MOST_ERRORS * ROUNDING * low.abs().max(high.abs()).max_element());
-        let (low, high) = (low - slack, high + slack);
-        Some(Self { index, corners, normal, area: area.length(), low, high })
+        // The sums are rounded, too.
+        let slack = (MOST_ERRORS as f32 + 1.0) * f32::EPSILON * low.abs().max(high.abs()).max_element();
+        Self { index, low: low - slack, high: high + slack }
     }
 
-    /// Largest magnitude of a coordinate.
-    fn coordinates(&self) -> f64 {
-        self.low.abs().max(self.high.abs()).max_element()
-    }
-
-    /// Keys of the rounded plane, equal on both sides; several where rounding may decide for another.
-    fn planes(&self) -> impl Iterator<Item = u64> + use<> {
-        let longest = (self.high - self.low).length();
-        let tilt = 2.0 * MOST_ERRORS * ROUNDING * self.coordinates() * longest / self.area;
-        let values = [self.normal.x, self.normal.y, self.normal.z, self.normal.dot(self.corners[0])];
-        let shift = (tilt + MOST_ERRORS * ROUNDING) * self.coordinates();
-        let steps: [[i64; 2]; 4] = core::array::from_fn(|i| {
-            let error = STEPS[i] * if i < 3 { tilt } else { shift };
-            let error = error.min(0.5);
-            [-error, error].map(|error| (STEPS[i] * values[i] + error).round() as i64)
-        });
-        let choices =
-            (0..16usize).filter(move |bits| (0..4).all(|i| bits >> i & 1 == 0 || steps[i][0] != steps[i][1]));
-        choices.map(move |bits| {
-            let cell: [i64; 4] = core::array::from_fn(|i| steps[i][bits >> i & 1]);
-            let sign = cell.iter().find(|step| **step != 0).map_or(1, |step| step.signum());
-            cell.iter().fold(0, |hash, step| mix(hash ^ (sign * step) as u64))
-        })
-    }
-
-    /// The pair with a triangle in the same plane that shares some of it.
-    fn overlap(&self, other: &Face) -> Option<Pair> {
-        let (first, second) = if self.index < other.index { (self, other) } else { (other, self) };
-        let (large, small) = if self.area >= other.area { (self, other) } else { (other, self) };
-        let tolerance = MOST_ERRORS * ROUNDING * large.coordinates().max(small.coordinates());
-        let height = |p: &DVec3| (*p - large.corners[0]).dot(large.normal);
-        if small.corners.iter().any(|p| height(p).abs() > tolerance) {
-            return None;
-        }
-        let common = large.common_area(small);
-        let pair = Pair {
-            triangles: [first.index, second.index],
-            same_front: self.normal.dot(other.normal) > 0.0,
-            covered: [common / first.area, common / second.area],
-        };
-        (common >= LEAST_PART * small.area).then_some(pair)
-    }
-
-    /// Twice the area of the intersection with a triangle in the same plane, seen along the axis in which the
-    /// plane extends least, over the same of a whole (Sutherland and Hodgman 1974).
-    fn common_area(&self, other: &Face) -> f64 {
-        let axis = longest_axis(self.normal);
-        let origin = self.corners[0];
-        let flat = |p: DVec3| {
-            DVec2::new(p[(axis + 1) % 3] - origin[(axis + 1) % 3], p[(axis + 2) % 3] - origin[(axis + 2) % 3])
-        };
-        let [corners, others] = [self.corners, other.corners].map(|corners| corners.map(flat));
-        let side = self.normal[axis].signum();
-        let mut polygon = others.to_vec();
-        for i in 0..3 {
-            let (a, b) = (corners[i], corners[(i + 1) % 3]);
-            let height = |p: DVec2| side * (b - a).perp_dot(p - a);
-            let mut inside = Vec::with_capacity(polygon.len() + 1);
-            for (j, &p) in polygon.iter().enumerate() {
-                let q = polygon[(j + 1) % polygon.len()];
-                let (at_p, at_q) = (height(p), height(q));
-                if at_p >= 0.0 {
-                    inside.push(p);
-                }
-                if (at_p < 0.0) != (at_q < 0.0) {
-                    inside.push(p + (q - p) * (at_p / (at_p - at_q)));
-                }
-            }
-            polygon = inside;
-        }
-        let fan =
-            polygon.windows(2).skip(1).map(|pair| (pair[0] - polygon[0]).perp_dot(pair[1] - polygon[0]));
-        fan.sum::<f64>().abs() / self.normal[axis].abs()
+    fn is_near(&self, other: &Self) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
     }
 }
 
-/// Collects the pairs among `indices`; `face` returns the triangle of an index.
+/// Collects the pairs among the triangles in `boxes`; `face` returns the triangle of an index.
 fn collect(
     face: &impl Fn(u32) -> Option<Face>,
-    indices: Vec<u32>,
+    boxes: Vec<Boxed>,
     differ: &impl Fn(u32, u32) -> bool,
     pairs: &mut Vec<Pair>,
 ) {
-    if indices.len() > FEW {
-        let boxes = || indices.iter().filter_map(|&index| face(index)).map(|face| (face.low, face.high));
-        let whole = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (low, high) = boxes().fold(whole, |whole, one| (whole.0.min(one.0), whole.1.max(one.1)));
-        let axis = longest_axis(high - low);
-        let mut centres: Vec<f64> = boxes().map(|(low, high)| low[axis] + high[axis]).collect();
+    if boxes.len() > FEW {
+        let whole = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let (low, high) =
+            boxes.iter().fold(whole, |whole, one| (whole.0.min(one.low), whole.1.max(one.high)));
+        let axis = longest_axis((high - low).as_dvec3());
+        let mut centres: Vec<f32> =
+            boxes.iter().map(|one| 0.5 * one.low[axis] + 0.5 * one.high[axis]).collect();
         let half = centres.len() / 2;
-        let middle = 0.5 * *centres.select_nth_unstable_by(half, f64::total_cmp).1;
+        let middle = *centres.select_nth_unstable_by(half, f32::total_cmp).1;
         drop(centres);
-        let part = |is_in: fn(&Face, usize, f64) -> bool| -> Vec<u32> {
-            let is_in = |index: &u32| face(*index).is_some_and(|face| is_in(&face, axis, middle));
-            indices.iter().copied().filter(is_in).collect()
-        };
-        let below = part(|face, axis, middle| face.low[axis] <= middle);
-        let above = part(|face, axis, middle| face.high[axis] >= middle);
+        let below: Vec<Boxed> = boxes.iter().copied().filter(|one| one.low[axis] <= middle).collect();
+        let above: Vec<Boxed> = boxes.iter().copied().filter(|one| one.high[axis] >= middle).collect();
         let (total, most) = (below.len() + above.len(), below.len().max(above.len()));
-        if most < indices.len() && total < indices.len() * 7 / 4 {
-            drop(indices);
+        if most < boxes.len() && total < boxes.len() * 7 / 4 {
+            drop(boxes);
             collect(face, below, differ, pairs);
             return collect(face, above, differ, pairs);
         }
     }
-    if indices.len() * indices.len() / 2 > MOST_PAIRS {
+    if boxes.len() * boxes.len() / 2 > MOST_PAIRS {
         return;
     }
-    let faces: Vec<Face> = indices.into_iter().filter_map(face).collect();
-    for (i, a) in faces.iter().enumerate() {
-        for b in &faces[i + 1..] {
-            let is_near = a.low.cmple(b.high).all() && b.low.cmple(a.high).all();
-            if is_near && a.index != b.index && differ(a.index, b.index) {
-                pairs.extend(a.overlap(b));
+    let mut faces = Vec::new();
+    faces.resize_with(boxes.len(), OnceCell::new);
+    let face = |i: usize| faces[i].get_or_init(|| face(boxes[i].index)).as_ref();
+    for (i, a) in boxes.iter().enumerate() {
+        for (j, b) in boxes.iter().enumerate().skip(i + 1) {
+            if a.is_near(b) && a.index != b.index && differ(a.index, b.index) {
+                pairs.extend(face(i).zip(face(j)).and_then(|(a, b)| a.overlap(b)));
             }
         }
     }
-}
-
-fn longest_axis(size: DVec3) -> usize {
-    (0..3).fold(0, |most, i| if size[i].abs() > size[most].abs() { i } else { most })
 }
 
 /// Notes pairs of different materials with the same front.
@@ -276,7 +207,7 @@ pub(super) fn note(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DQuat, Vec3};
+    use glam::{DQuat, DVec3};
     use halflight_core::Rgb;
     use halflight_core::sampling::Random;
 

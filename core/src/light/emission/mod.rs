@@ -2,17 +2,21 @@
 //! direction by its emission. The power of a photon is the emitted power over the density of all choices, so
 //! that the powers of photons sum to the power of the lights.
 //!
-//! Infinite light enters through the disc that the scene's bounding sphere presents to it.
+//! Infinite light enters through the disc that the scene's bounding sphere presents to it; in a very large
+//! scene, more of it near the surfaces that the camera sees.
 
+mod focus;
 mod guide;
 mod learning;
 mod pdf;
+mod power;
 
+pub use focus::Focus;
 pub use learning::GuideStats;
 pub(crate) use pdf::LightType;
 
 use super::area::Emitter;
-use super::emitted::{emitted_at, mean_luminance, spot_falloff, strength};
+use super::emitted::{emitted_at, spot_falloff};
 use super::sampler::LightSampler;
 use crate::Rgb;
 use crate::geometry::{Bounds, Frame, MISS, Ray};
@@ -24,8 +28,10 @@ use crate::sampling::warp::{
 use crate::sampling::{AliasTable, Numbers, Sampler};
 use crate::scene::{PointLight, Scene};
 use core::f32::consts::{PI, TAU};
+use focus::Entrance;
 use glam::Vec3;
 use guide::{EmissionGuide, GuideSample};
+use power::power;
 
 /// Dimensions of a photon's sampler that emission uses, from 0 on.
 pub const DIMENSIONS: u32 = 3;
@@ -57,9 +63,8 @@ pub struct EmissionSampler<'m> {
     /// Emitters, points and spots, directional lights, the environment, by their power: the order of
     /// emission.
     pub(super) table: AliasTable<'m>,
-    pub(super) center: Vec3,
-    /// Radius of the bounding sphere.
-    pub(super) radius: f32,
+    /// Disc of infinite light.
+    entrance: Entrance,
     /// Learned distribution of useful photons.
     guide: Option<EmissionGuide<'m>>,
 }
@@ -80,14 +85,34 @@ impl<'m> EmissionSampler<'m> {
         bounds: &Bounds,
         arena: &mut Arena<'m>,
     ) -> Result<Self, OutOfMemory> {
+        Self::build_around(scene, lights, (bounds, None), arena)
+    }
+
+    /// Sampler for the lights of a scene within bounds, which sends more light from infinity to the `focus`
+    /// if the scene is much larger.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] if the arena has less than [`EmissionSampler::footprint`].
+    pub fn build_around(
+        scene: &Scene,
+        lights: &LightSampler,
+        (bounds, focus): (&Bounds, Option<Focus>),
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
         let empty = bounds.is_empty();
         let (center, diagonal) = if empty { (Vec3::ZERO, 0.0) } else { (bounds.center(), bounds.diagonal()) };
         let radius = 0.5 * diagonal * SPHERE_MARGIN;
-        let power = |i| power(scene, lights, radius, i);
+        let entrance = Entrance::new(center, radius, bounds, focus);
+        let power = |i| power(scene, lights, entrance.area(), i);
         let largest = (0..lights.count()).map(power).fold(0.0, f64::max);
         // Relative to the largest, to fit into f32.
         let relative = |i| if largest > 0.0 { (power(i) / largest) as f32 } else { 0.0 };
-        Ok(Self { table: AliasTable::build(lights.count(), relative, arena)?, center, radius, guide: None })
+        Ok(Self { table: AliasTable::build(lights.count(), relative, arena)?, entrance, guide: None })
+    }
+
+    /// True if more light from infinity is sent to the focus than to the rest of the scene.
+    pub(crate) fn is_focused(&self) -> bool {
+        self.entrance.is_focused()
     }
 
     /// Photon of the random `numbers`. `None` without light, or without power.
@@ -172,9 +197,8 @@ impl<'m> EmissionSampler<'m> {
             return (local.z > 0.0).then(|| concentric_square(local.truncate()));
         }
         let through = || {
-            let local = Frame::from_normal(way).to_local(to - self.center);
-            (local.truncate().length() <= self.radius)
-                .then(|| concentric_square(local.truncate() / self.radius))
+            let local = Frame::from_normal(way).to_local(to - self.entrance.center);
+            self.entrance.unit(local.truncate()).map(concentric_square)
         };
         match lights.without_surface(scene, light) {
             Some(PointLight::Point { .. }) => Some(uniform_sphere_square(way)),
@@ -244,19 +268,13 @@ impl<'m> EmissionSampler<'m> {
         }
     }
 
-    /// Parallel light of `irradiance`, through a point of the disc that the scene's bounding sphere presents
-    /// to it.
+    /// Parallel light of `irradiance`, through a point of the disc of infinite light; `None` if it misses the
+    /// scene.
     fn parallel(&self, direction: Vec3, irradiance: Rgb, place: [f32; 2]) -> Option<EmissionSample> {
-        let frame = Frame::from_normal(direction);
-        let across = frame.to_world((concentric_disk(place) * self.radius).extend(-self.radius));
-        let power = irradiance * (PI * self.radius * self.radius);
-        Some(EmissionSample {
-            ray: Ray::new(self.center + across, direction),
-            power,
-            triangle: MISS,
-            light: 0,
-            cell: 0,
-        })
+        let point = self.entrance.point(concentric_disk(place));
+        let start = self.entrance.start(direction, point)?;
+        let power = irradiance * self.entrance.area_of(point);
+        Some(EmissionSample { ray: Ray::new(start, direction), power, triangle: MISS, light: 0, cell: 0 })
     }
 }
 
@@ -285,24 +303,6 @@ fn from_surface(
         light: 0,
         cell: 0,
     })
-}
-
-/// Approximate luminance of the power of light `i`.
-fn power(scene: &Scene, lights: &LightSampler, radius: f32, i: usize) -> f64 {
-    const PI: f64 = core::f64::consts::PI;
-    let disc = PI * f64::from(radius) * f64::from(radius);
-    if let Some(emitter) = lights.emitters.get(i) {
-        let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
-        return PI * mean_luminance(scene, emitter) * f64::from(emitter.area) * sides;
-    }
-    match lights.without_surface(scene, i) {
-        Some(light @ PointLight::Point { .. }) => 4.0 * PI * strength(light),
-        Some(light @ PointLight::Spot { cos_outer, .. }) => {
-            2.0 * PI * (1.0 - f64::from(*cos_outer)) * strength(light)
-        }
-        Some(light @ PointLight::Directional { .. }) => disc * strength(light),
-        None => 4.0 * PI * disc * lights.environment.map_or(0.0, |sky| f64::from(sky.mean)),
-    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::EmissionSampler;
 use crate::light::sampler::{LightSample, LightSampler};
 use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_cone_pdf};
 use crate::scene::{PointLight, Scene};
-use core::f32::consts::{FRAC_1_PI, PI};
+use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
 /// Kinds of light by the techniques of camera paths that find them.
@@ -76,7 +76,8 @@ impl EmissionSampler<'_> {
             (Some(sampler), Some(environment)) => {
                 let index = lights.finite_count() + lights.distant.len();
                 let density = self.density(scene, lights, index, -direction, position);
-                density * sampler.pdf(environment, Vec3::ZERO, direction) * self.per_disc()
+                let of_line = self.entrance.density(direction, position);
+                density * sampler.pdf(environment, Vec3::ZERO, direction) * of_line
             }
             _ => 0.0,
         }
@@ -99,7 +100,9 @@ impl EmissionSampler<'_> {
                 let spread = uniform_cone_pdf(1.0 - cos_outer);
                 ((position - *from, *from), spread / from.distance_squared(position))
             }
-            Some(PointLight::Directional { direction, .. }) => ((*direction, position), self.per_disc()),
+            Some(PointLight::Directional { direction, .. }) => {
+                ((*direction, position), self.entrance.density(*direction, position))
+            }
             None => return 0.0,
         };
         self.density(scene, lights, index, way.normalize_or_zero(), on) * density
@@ -135,10 +138,5 @@ impl EmissionSampler<'_> {
         } else {
             LightType::Infinite
         }
-    }
-
-    /// Density per area of the disc through which infinite light enters.
-    fn per_disc(&self) -> f32 {
-        1.0 / (PI * self.radius * self.radius)
     }
 }

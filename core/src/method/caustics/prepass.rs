@@ -90,7 +90,7 @@ pub fn prepass<'a, F: Features>(
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
 ) -> Result<Prepass<'a>, OutOfMemory> {
-    let RenderContext { scene, ref bvh, ref lights, .. } = *context;
+    let RenderContext { ref lights, .. } = *context;
     let step = step(context, memory.available());
     let (kept, lent) = (kept(lights.count()), lent(lights.count(), step));
     let later = kept.and(least_footprint()).bytes().saturating_add(settings.reserved);
@@ -105,13 +105,13 @@ pub fn prepass<'a, F: Features>(
             found: arena.slice(step)?,
             executor,
         };
-        let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
+        let by_power = context.emission(arena)?;
         let mut learning = Learning { light_paths, paths, share: None };
         let decision = match learning.run(&by_power, arena)? {
             Learned::Paths => Decision::Paths,
             Learned::Photons(stats, benefit) => {
                 let mut arena = memory.take(EMISSION, kept)?;
-                let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut arena)?;
+                let by_power = context.emission(&mut arena)?;
                 let sampler = stats.guide(&by_power, &mut arena)?;
                 Decision::Photons(CausticEmission { sampler, radii: context.radii(), benefit })
             }
@@ -250,14 +250,14 @@ pub fn unseen<'m, F: Features>(
     memory: &mut impl MemorySource<'m>,
     executor: &mut impl Executor,
 ) -> Result<Option<f64>, OutOfMemory> {
-    let RenderContext { scene, ref bvh, ref lights, .. } = *context;
+    let RenderContext { scene, ref lights, .. } = *context;
     let lent = unseen_footprint(lights.count());
     if !super::are_possible(scene) || !memory.has(lent) {
         return Ok(None);
     }
     memory.lend("audit", lent, |_, arena| {
         let found = arena.slice(STEP)?;
-        let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
+        let by_power = context.emission(arena)?;
         let radii = context.radii().after(FIRST_RADIUS, 0);
         let mut light_paths = LightPaths { context, radii, beside_records: false, found, executor };
         light_paths.trace::<F>(&by_power, STEP, AUDIT_MAP)?;

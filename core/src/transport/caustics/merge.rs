@@ -42,7 +42,7 @@
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::light::{EmissionSampler, LightSample};
-use crate::photon::{Kernel, PhotonMap, QueryDisc, Uniform};
+use crate::photon::{Kernel, MOST_REMAINING, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{
@@ -148,8 +148,8 @@ impl<'a> CausticMerging<'a> {
     }
 
     /// Search after the receiver at `position`, which segment number `segments` hits; `None` if it is the
-    /// merging vertex. If depth `is_limited`, only the first surface can be: photons do not store the length
-    /// of their paths.
+    /// merging vertex. If depth `is_limited`, photons know how many segments their paths have left, up to
+    /// [`MOST_REMAINING`].
     #[inline]
     fn progress_at(
         &self,
@@ -159,15 +159,12 @@ impl<'a> CausticMerging<'a> {
         is_limited: bool,
     ) -> Option<Progress> {
         let is_first = state.radius == 0.0;
-        let is_known = || {
-            is_limited
-                || state.progress == Progress::KNOWN
-                || is_wide_enough(state.radius, self.radii.radius(position))
-        };
+        let is_known =
+            || state.progress == Progress::KNOWN || is_wide_enough(state.radius, self.radii.radius(position));
         if !is_first && (!self.beside_records || state.ratio > 0.0) && is_known() {
             return Some(if self.beside_records { Progress::KNOWN } else { Progress::DONE });
         }
-        (segments > 1 && is_limited).then_some(Progress::NEVER)
+        (is_limited && segments > MOST_REMAINING + 1).then_some(Progress::NEVER)
     }
 
     /// True if photons may pass `bsdf` to the receiver at which `ratio` starts.
@@ -187,17 +184,18 @@ impl<'a> CausticMerging<'a> {
     }
 
     /// Radiance towards `wo` from the photons around `point`. `travelled` is the length of the path from the
-    /// camera, or zero behind a receiver. `rotation` is that of the boundary rays, in turns.
+    /// camera, or zero behind a receiver. `remaining` segments are those that the path of a photon has left
+    /// at least. `rotation` is that of the boundary rays, in turns.
     #[inline]
     fn reflected<F: Features>(
         &self,
         context: &SceneContext<F>,
-        sample: u32,
+        (sample, remaining): (u32, u32),
         (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
         rotation: impl FnOnce() -> f32,
     ) -> RadianceEstimate {
-        let map = self.maps[sample as usize & 1];
+        let map = &self.maps[sample as usize & 1].with_remaining(remaining);
         if map.is_empty() || !bsdf.is_receiver() {
             return RadianceEstimate::default();
         }
@@ -248,7 +246,8 @@ impl<F: Features> LightEstimator<F> for CausticMerging<'_> {
             if progress.is_none() {
                 let rotation = || vertex.sampler.single(dimension::PROBES + segments);
                 let from = (wo, if state.radius == 0.0 { vertex.travelled } else { 0.0 });
-                let gathered = self.reflected(context, vertex.sample, (point, bsdf), from, rotation);
+                let light = (vertex.sample, settings.extra_segments(segments));
+                let gathered = self.reflected(context, light, (point, bsdf), from, rotation);
                 add(gathered.known(vertex));
             }
         }

@@ -17,7 +17,7 @@ use crate::scene::Scene;
 use crate::transport::caustics::merge::is_wide_enough;
 use crate::transport::photon_mapping::deposit::PhotonTracerSettings;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
-use crate::transport::settings::{Counters, UNLIMITED};
+use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 pub use crate::transport::walk::light::PATHS_PER_TASK;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
@@ -272,9 +272,7 @@ struct MisDepositor<'s, 'a, F, L> {
 impl<F: Features, L> MisDepositor<'_, '_, F, L> {
     /// True if light is merged at the receiver `vertex`, not at the receiver before it.
     fn is_merged(&self, state: &LightPathState, vertex: &Vertex) -> bool {
-        let LightWalk { max_depth, .. } = self.tracer.walk;
-        let from =
-            if state.path_pdfs == SCATTERED && max_depth == UNLIMITED { state.chain_ratio } else { 0.0 };
+        let from = if state.path_pdfs == SCATTERED { state.chain_ratio } else { 0.0 };
         is_wide_enough(self.tracer.radii.radius(vertex.point.position), from)
     }
 
@@ -306,7 +304,8 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, PhotonWeight, &mut Counters)
         if has_photon && self.is_merged(state, vertex) {
             let weight = self.weight(state, vertex);
             if let Some(factor) = weight.factor(vertex) {
-                (self.store)(state, vertex.photon(Rgb::from(state.power) * factor), weight, counters);
+                let photon = vertex.photon(Rgb::from(state.power) * factor);
+                (self.store)(state, state.limited(photon, self.tracer.walk.max_depth), weight, counters);
             }
         }
         Some(Continuation {

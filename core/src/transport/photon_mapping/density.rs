@@ -5,7 +5,7 @@ use crate::bvh::Bvh;
 use crate::bvh::clearance::{Clearance, ClearanceQuery};
 use crate::geometry::Ray;
 use crate::photon::{
-    DensityEstimate, FLATNESS, Kernel, KernelBoundary, PROBES, PhotonMap, QueryDisc, Uniform,
+    DensityEstimate, FLATNESS, Kernel, KernelBoundary, MOST_REMAINING, PROBES, PhotonMap, QueryDisc, Uniform,
 };
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
@@ -78,14 +78,16 @@ impl<'a> PhotonLight<'a> {
     }
 
     /// Radiance of reflected light from `point` to `wo`, at the end of a path of length `travelled` from the
-    /// camera; `None` if surfaces like `bsdf` store no photons. `rotation`, from 0 to 1, rotates the
-    /// probes for walls, which are not counted as rays.
+    /// camera; `None` if surfaces like `bsdf` store no photons. `remaining` segments are those that the path
+    /// of a photon has left at least. `rotation`, from 0 to 1, rotates the probes for walls, which are not
+    /// counted as rays.
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
         context: &SceneContext<F>,
         (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
+        remaining: u32,
         rotation: f32,
     ) -> Option<RadianceEstimate> {
         if !bsdf.gathers_photons(context.separates_coats()) {
@@ -97,11 +99,12 @@ impl<'a> PhotonLight<'a> {
             radius: self.discs.radius_after(travelled, point.position),
             kernel: self.kernel,
         };
-        let density = self.is_sparse.then(|| self.map.gather(context.level, &disc, &Uniform(Rgb::ONE)));
+        let map = &self.map.with_remaining(remaining);
+        let density = self.is_sparse.then(|| map.gather(context.level, &disc, &Uniform(Rgb::ONE)));
         if density.is_some_and(|density| density.photons == 0) {
             return Some(RadianceEstimate::default());
         }
-        let light = Light { map: self.map, is_caustic: self.is_sparse, min_photons: self.min_photons };
+        let light = Light { map, is_caustic: self.is_sparse, min_photons: self.min_photons };
         Some(reflected(light, context, (&disc, density), (point, bsdf), wo, rotation))
     }
 }
@@ -115,8 +118,8 @@ impl<F: Features> LightEstimator<F> for PhotonLight<'_> {
         bsdf.gathers_photons_on_base(context.separates_coats())
     }
 
-    /// Surfaces with a diffuse part take all reflected light from photons. With a limit of depth only the
-    /// first vertex of a path does, since photons do not store their path length.
+    /// Surfaces with a diffuse part take all reflected light from photons. With a limit of depth vertices do
+    /// up to [`MOST_REMAINING`] segments behind the first, the largest length that photons tell.
     #[inline]
     fn at_vertex(
         &self,
@@ -127,12 +130,14 @@ impl<F: Features> LightEstimator<F> for PhotonLight<'_> {
         add: &mut impl FnMut(KnownLight),
     ) -> RemainingLight {
         let mut rest = RemainingLight::all(vertex);
-        if vertex.segments > 1 && settings.is_limited() {
+        let remaining = settings.extra_segments(vertex.segments);
+        if remaining > MOST_REMAINING {
             return rest;
         }
         let rotation = vertex.sampler.single(dimension::PROBES + vertex.segments);
         let from = (vertex.wo, vertex.travelled);
-        let reflected = self.reflected(context, (vertex.point, &vertex.bsdf), from, rotation);
+        let surface = (vertex.point, &vertex.bsdf);
+        let reflected = self.reflected(context, surface, from, remaining, rotation);
         add(reflected.unwrap_or_default().known(vertex));
         if reflected.is_some() {
             rest.wide = Some(PathClasses::EMITTED);
@@ -143,7 +148,7 @@ impl<F: Features> LightEstimator<F> for PhotonLight<'_> {
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
     /// This path tracer with photons: surfaces with a diffuse part take reflected light from photons. With a
-    /// limit of depth only the first vertex of a path does.
+    /// limit of depth vertices do up to [`MOST_REMAINING`] segments behind the first.
     pub fn with_photons(&self, photons: PhotonLight<'a>) -> PathIntegrator<'a, F, PhotonLight<'a>> {
         self.with_estimator(photons)
     }

@@ -16,7 +16,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::Scene;
 use crate::transport::photon_mapping::visible_points::VisiblePoints;
-use crate::transport::settings::Counters;
+use crate::transport::settings::{Counters, UNLIMITED};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
 pub use crate::transport::walk::light::{PATHS_PER_TASK, VERTICES_PER_TASK};
@@ -125,7 +125,9 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut depositor = Depositor { keep: self.keep, buffer: PhotonSample::new(out) };
+        let max_depth = self.flight.max_depth;
+        let buffer = PhotonSample::new(out, max_depth != UNLIMITED);
+        let mut depositor = Depositor { keep: self.keep, max_depth, buffer };
         let counters = self.flight.follow(task, map, scratch, &mut depositor)?;
         depositor.buffer.finish();
         Ok(counters)
@@ -153,8 +155,8 @@ pub struct VisiblePhoton {
     pub path: usize,
     /// Cell of the emission guide.
     pub cell: u32,
-    /// Luminance of its power in W.
-    pub power: f32,
+    /// Luminance of its power in W, or of its light in the picture, up to a factor.
+    pub light: f32,
 }
 
 /// Visitor that reports photons near visible points.
@@ -179,14 +181,13 @@ impl Visitor for VisibilityCounter<'_> {
         vertex: &Vertex,
         _: &mut Counters,
     ) -> Option<Continuation> {
-        let stores = self.keep.stores(state, vertex);
-        if stores && self.sight.contains(vertex.point.position, vertex.point.geometric_normal) {
-            let power = luminance(Rgb::from(state.power));
-            (self.seen)(VisiblePhoton {
-                path: state.number as usize % PATHS_PER_TASK,
-                cell: state.cell,
-                power,
-            });
+        if self.keep.stores(state, vertex) {
+            let importance = self.sight.importance(vertex.point.position, vertex.point.geometric_normal);
+            let light = luminance(Rgb::from(state.power)) * importance;
+            if light > 0.0 {
+                let path = state.number as usize % PATHS_PER_TASK;
+                (self.seen)(VisiblePhoton { path, cell: state.cell, light });
+            }
         }
         self.keep.continuation(vertex)
     }
@@ -195,6 +196,7 @@ impl Visitor for VisibilityCounter<'_> {
 /// Visitor that stores the selected photons.
 pub(in crate::transport) struct Depositor<'p> {
     keep: PhotonFilter,
+    max_depth: u32,
     buffer: PhotonSample<'p>,
 }
 
@@ -217,7 +219,7 @@ impl Visitor for Depositor<'_> {
         if stores {
             let power = Rgb::from(state.power);
             if power.max_element() > 0.0 {
-                self.buffer.push(vertex.photon(power), counters);
+                self.buffer.push(state.limited(vertex.photon(power), self.max_depth), counters);
             }
         }
         self.keep.continuation(vertex)

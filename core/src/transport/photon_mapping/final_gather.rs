@@ -18,7 +18,9 @@ use crate::bvh::Bvh;
 use crate::geometry::{Frame, Ray};
 use crate::light::luminance;
 use crate::memory::{Arena, Line};
-use crate::photon::{FLATNESS, Kernel, MIN_NORMAL_COSINE, Neighbours, Photon, PhotonMap, QueryDisc};
+use crate::photon::{
+    FLATNESS, Kernel, MIN_NORMAL_COSINE, MOST_REMAINING, Neighbours, Photon, PhotonMap, QueryDisc,
+};
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{KnownLight, LightEstimator, PathVertex, RemainingLight};
@@ -204,13 +206,15 @@ impl PhotonMaps<'_> {
             let rest = RemainingLight { wide: None, is_lit: true, ..all };
             return (RadianceEstimate { light, ..RadianceEstimate::default() }, rest);
         }
-        if is_limited && segments > 1 {
+        let remaining = settings.extra_segments(segments);
+        if remaining > MOST_REMAINING {
             return (RadianceEstimate::default(), RemainingLight::of(PathClasses::ALL));
         }
         match &self.caustic {
             Some(caustic) => {
                 let travelled = if came.may_end_in_photon_map() { 0.0 } else { travelled };
-                let gathered = caustic.reflected(context, (point, bsdf), (wo, travelled), rotation);
+                let gathered =
+                    caustic.reflected(context, (point, bsdf), (wo, travelled), remaining, rotation);
                 let rest = RemainingLight { wide: Some(PathClasses::NO_CAUSTIC), ..all };
                 (gathered.unwrap_or_default(), rest)
             }
@@ -249,7 +253,7 @@ impl<F: Features> LightEstimator<F> for &[PhotonMaps<'_>; 2] {
 impl<'a, F: Features> PathIntegrator<'a, F> {
     /// This path tracer with photon maps: surfaces with a diffuse part take caustics from photons, and gather
     /// rays from them end in a photon map: even samples in the first, odd samples in the second. With a limit
-    /// of depth only the first vertex of a path takes light from photons.
+    /// of depth only gather rays from the first vertex of a path end in a map.
     pub fn with_maps(&self, maps: &'a [PhotonMaps<'a>; 2]) -> PathIntegrator<'a, F, &'a [PhotonMaps<'a>; 2]> {
         self.with_estimator(maps)
     }

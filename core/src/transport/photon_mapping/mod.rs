@@ -4,6 +4,7 @@
 pub(in crate::transport) mod density;
 pub mod deposit;
 pub mod final_gather;
+pub mod focus;
 pub mod hidden;
 pub mod irradiance;
 pub(in crate::transport) mod radius;

@@ -161,6 +161,8 @@ pub(in crate::transport) struct Seen<'a> {
 pub struct VisiblePoints<'a> {
     map: &'a PhotonMap<'a>,
     radius: VisibleRadius,
+    /// True if photons count by their light in the picture, not by their power.
+    weighs_area: bool,
     level: Level,
 }
 
@@ -186,22 +188,32 @@ impl<'a> VisiblePoints<'a> {
             radius: VisibleRadius::Schedule(
                 discs.of_pixels(pixels.max(RADIUS_IN_STEPS * raster.step as f32)),
             ),
+            weighs_area: false,
             level,
         }
     }
 
-    /// Visible points `map` with a constant `radius`.
-    pub fn within(map: &'a PhotonMap<'a>, radius: f32, level: Level) -> Self {
-        Self { map, radius: VisibleRadius::Constant(radius), level }
+    /// These points, where photons count by their power over the area of their disc: by their light in the
+    /// picture. Without, they count by their power, which is enough if most discs are alike.
+    pub fn by_area(self, weighs_area: bool) -> Self {
+        Self { weighs_area, ..self }
     }
 
-    /// True if a photon at `place`, on a surface with this `normal`, is visible.
-    pub(in crate::transport) fn contains(&self, place: Vec3, normal: Vec3) -> bool {
+    /// Visible points `map` with a constant `radius`.
+    pub fn within(map: &'a PhotonMap<'a>, radius: f32, level: Level) -> Self {
+        Self { map, radius: VisibleRadius::Constant(radius), weighs_area: false, level }
+    }
+
+    /// Benefit, up to a factor, of a photon of power 1 at `place`, on a surface with this
+    /// `normal`; zero if it is not visible.
+    pub(in crate::transport) fn importance(&self, place: Vec3, normal: Vec3) -> f32 {
         let radius = match self.radius {
             VisibleRadius::Schedule(discs) => discs.radius(place),
             VisibleRadius::Constant(radius) => radius,
         };
+        let importance = if self.weighs_area { 1.0 / (radius * radius) } else { 1.0 };
         let disc = QueryDisc { place, normal, radius, kernel: Kernel::Constant };
-        self.map.gather(self.level, &disc, &Uniform(Rgb::ONE)).photons > 0
+        let is_visible = self.map.gather(self.level, &disc, &Uniform(Rgb::ONE)).photons > 0;
+        if is_visible { importance } else { 0.0 }
     }
 }

@@ -13,7 +13,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::sampling::{Numbers, Sampler, mix};
 use crate::scene::SurfacePoint;
-use crate::transport::settings::Counters;
+use crate::transport::settings::{Counters, UNLIMITED};
 use crate::transport::walk::context::{Origin, SceneContext};
 use crate::transport::walk::dimension;
 use crate::transport::walk::history::History;
@@ -68,6 +68,18 @@ pub(crate) struct LightPathState {
     pub history: History,
     /// Product of the continuation probabilities so far.
     survived: f32,
+}
+
+impl LightPathState {
+    /// `photon` of this path, which knows its length if paths have at most `max_depth` segments.
+    #[inline]
+    pub(in crate::transport) fn limited(&self, photon: Photon, max_depth: u32) -> Photon {
+        match max_depth {
+            UNLIMITED => photon,
+            // Any camera path has one segment.
+            _ => photon.with_remaining(max_depth.saturating_sub(self.segments + 1)),
+        }
+    }
 }
 
 /// Vertex of a light subpath.

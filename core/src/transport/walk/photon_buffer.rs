@@ -60,11 +60,14 @@ pub(crate) struct PhotonSample<'p> {
     /// Photons so far, and the fraction that is kept.
     count: u32,
     fraction: f32,
+    /// True if photons know the length of their paths.
+    is_limited: bool,
 }
 
 impl<'p> PhotonSample<'p> {
-    pub(crate) fn new(photons: &'p mut [Photon]) -> Self {
-        Self { buffer: PhotonBuffer::new(photons), count: 0, fraction: 1.0 }
+    /// Sample in the memory `photons`, which know the length of their paths if it `is_limited`.
+    pub(crate) fn new(photons: &'p mut [Photon], is_limited: bool) -> Self {
+        Self { buffer: PhotonBuffer::new(photons), count: 0, fraction: 1.0, is_limited }
     }
 
     pub(crate) fn push(&mut self, photon: Photon, counters: &mut Counters) {
@@ -85,7 +88,9 @@ impl<'p> PhotonSample<'p> {
         if self.fraction < 1.0 {
             let PhotonBuffer { photons, count } = &mut self.buffer;
             for photon in photons.iter_mut().take(*count) {
-                *photon = photon.with_power(photon.power() / self.fraction);
+                let scaled = photon.with_power(photon.power() / self.fraction);
+                let remaining = photon.remaining();
+                *photon = if self.is_limited { scaled.with_remaining(remaining) } else { scaled };
             }
         }
         self.buffer.finish();
@@ -114,7 +119,7 @@ mod tests {
         };
         for count in [10, 5529, 6144, 30_000, 300_000] {
             let mut memory = vec![Photon::NONE; ROOM];
-            let mut sample = PhotonSample::new(&mut memory);
+            let mut sample = PhotonSample::new(&mut memory, false);
             let mut counters = Counters::default();
             (0..count).for_each(|i| sample.push(photon(i), &mut counters));
             sample.finish();

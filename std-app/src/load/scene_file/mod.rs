@@ -96,11 +96,20 @@ pub fn parse(text: &str, file: &Path) -> Result<SceneFile, LoadError> {
         // serde writes `unknown field ..., expected one of ...`: the second half is the help.
         let message = error.message().replace('\n', " ");
         let (problem, help) = match message.split_once(", expected ") {
-            Some((problem, expected)) => (problem.to_string(), format!("expected {expected}")),
+            Some((problem, expected)) => (problem.to_string(), format!("expected {}", in_words(expected))),
             None => (message, "docs/scene-file.md describes the scene file".into()),
         };
         Source::new(text, file).error(error.span().unwrap_or_default(), problem, help)
     })
+}
+
+/// The value that serde expects, without the names of types.
+fn in_words(expected: &str) -> &str {
+    match expected {
+        "u32" => "a whole number from 0 to 4294967295",
+        "f32" | "f64" => "a number",
+        other => other,
+    }
 }
 
 /// Text of a scene file, for errors with line and column, and the files that it names.
