@@ -246,7 +246,11 @@ impl Wavefront<'_> {
     }
 
     /// Traces the queue of shadow rays, and adds the light of unoccluded ones to their paths.
-    fn trace_shadow_rays<F: Features>(&mut self, context: &SceneContext<F>, counters: &mut Counters) {
+    pub(in crate::transport) fn trace_shadow_rays<F: Features>(
+        &mut self,
+        context: &SceneContext<F>,
+        counters: &mut Counters,
+    ) {
         let count = core::mem::take(&mut self.shadows);
         let Self { paths, shadow_rays: rays, shadow_light: light, shadow_hits: hits, hidden, .. } = self;
         let arrive = |ray: &Ray, light: Rgb| {

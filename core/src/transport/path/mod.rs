@@ -22,6 +22,7 @@ mod direct;
 pub(in crate::transport) mod estimator;
 mod lanes;
 pub(in crate::transport) mod pixels;
+mod points;
 pub mod reference;
 pub(in crate::transport) mod reuse;
 pub mod reuse_pilot;
@@ -31,6 +32,7 @@ pub(in crate::transport) mod silhouette;
 
 pub use crate::transport::wavefront::WAVE;
 pub use estimator::LightEstimator;
+pub use points::IrradiancePoint;
 pub use reuse::PathReuse;
 pub use sharing::Sharing;
 
