@@ -119,7 +119,7 @@ pub use renderer::{
     Until,
 };
 pub use scene::Scene;
-pub use transport::{Counters, IrradiancePoint};
+pub use transport::{Counters, IrradiancePoint, LightPart};
 
 /// Linear sRGB triple: radiance in W/(m² sr), reflectance, throughput; one meaning per use.
 pub type Rgb = glam::Vec3;

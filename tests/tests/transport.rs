@@ -16,7 +16,9 @@ use halflight_core::scene::{Camera, Scene, SurfacePoint};
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::path::reference;
-use halflight_core::transport::{Counters, IrradiancePoint, PathIntegrator, PathSettings, UNLIMITED};
+use halflight_core::transport::{
+    Counters, IrradiancePoint, LightPart, PathIntegrator, PathSettings, UNLIMITED,
+};
 use halflight_tests::memory::{TestArena, with_structures};
 use halflight_tests::scenes::{
     SceneBuffers, constant_environment, cornell_box, emitter, everything, room_with_lamp,

@@ -6,13 +6,14 @@ use crate::bsdf::Features;
 use crate::film::PIXELS_PER_TILE;
 use crate::memory::{Footprint, OutOfMemory};
 use crate::transport::path::WAVE;
-use crate::transport::{IrradiancePoint, PathIntegrator};
+use crate::transport::{IrradiancePoint, LightPart, PathIntegrator};
 
 /// Irradiance at the points of one scene. Pixel `i` of the film is point `i`.
 #[derive(Clone, Copy)]
 pub struct IrradiancePoints<'a, F> {
     integrator: PathIntegrator<'a, F>,
     points: &'a [IrradiancePoint],
+    part: LightPart,
 }
 
 impl<'a, F: Features> IrradiancePoints<'a, F> {
@@ -21,9 +22,9 @@ impl<'a, F: Features> IrradiancePoints<'a, F> {
         PathIntegrator::<F>::scratch(WAVE)
     }
 
-    /// Path tracing of `points`.
-    pub fn new(context: &RenderContext<'a>, points: &'a [IrradiancePoint]) -> Self {
-        Self { integrator: context.integrator(), points }
+    /// Path tracing of this part of the light at `points`.
+    pub fn new(context: &RenderContext<'a>, points: &'a [IrradiancePoint], part: LightPart) -> Self {
+        Self { integrator: context.integrator(), points, part }
     }
 
     /// The points, in the order of the film.
@@ -40,13 +41,13 @@ impl<'a, F: Features> IrradiancePoints<'a, F> {
         round: &mut Round<E>,
         finished: impl Fn(usize) -> bool + Send + Sync,
     ) -> Result<(), OutOfMemory> {
-        let Self { integrator, points } = self;
+        let Self { integrator, points, part } = self;
         round.open_tiles(
             u32::MAX,
             |tile| !finished(tile),
             |tile, samples, scratch, pixels| {
                 let of_tile = points.chunks(PIXELS_PER_TILE).nth(tile).unwrap_or(&[]);
-                integrator.sample_irradiance(of_tile, samples, WAVE, scratch, pixels)
+                integrator.sample_irradiance((of_tile, *part), samples, WAVE, scratch, pixels)
             },
         )
     }

@@ -12,7 +12,7 @@ use crate::method::{
     Executor, IrradiancePoints, PilotSize, RenderContext, RenderMethod, RenderState, Round, Shard,
 };
 use crate::scene::Scene;
-use crate::transport::{Counters, IrradiancePoint, PathSettings, UNLIMITED};
+use crate::transport::{Counters, IrradiancePoint, LightPart, PathSettings, UNLIMITED};
 use crate::{Level, Rgb};
 use glam::Vec3;
 use libm::{ceil, fmin, sqrt};
@@ -35,6 +35,9 @@ const CHUNK: usize = 1024;
 /// Most points: numbers have 31 bits beside the Z-curve.
 const MOST_POINTS: usize = 1 << 30;
 
+/// Most samples of a point.
+const MOST_SAMPLES: u32 = 1 << 30;
+
 /// Settings of irradiance at points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointSettings {
@@ -46,11 +49,13 @@ pub struct PointSettings {
     pub level: Level,
     /// Part of the points to estimate, in tiles of 256 near points.
     pub shard: Shard,
+    /// Light to estimate.
+    pub light: LightPart,
 }
 
 impl Default for PointSettings {
     fn default() -> Self {
-        Self { seed: 0, max_depth: None, level: Level::detect(), shard: Shard::WHOLE }
+        Self { seed: 0, max_depth: None, level: Level::detect(), shard: Shard::WHOLE, light: LightPart::All }
     }
 }
 
@@ -119,7 +124,7 @@ impl<'a> IrradianceRenderer<'a> {
         executor: &mut impl Executor,
     ) -> Result<Self, RenderError> {
         if !(1..=MOST_POINTS).contains(&points.len()) {
-            return Err(RenderError::Size);
+            return Err(RenderError::Points);
         }
         scene.mesh.validate(scene.materials.len()).map_err(RenderError::Triangle)?;
         let needed = Self::required_memory(scene, points.len()).structures;
@@ -128,22 +133,45 @@ impl<'a> IrradianceRenderer<'a> {
         }
         let bvh = Bvh::build_with(&scene.mesh, arena, settings.level, executor.fork())?;
         let lights = LightSampler::build(scene, arena)?.with_level(settings.level);
+        Self::over((scene, bvh, lights), points, settings, arena, executor)
+    }
+
+    /// Memory of the points alone, beside structures of the scene that exist.
+    #[doc(hidden)]
+    pub fn footprint(points: usize) -> Footprint {
+        Layout::of(points).footprint()
+    }
+
+    /// As [`IrradianceRenderer::new`], over structures of the scene that exist.
+    ///
+    /// # Errors
+    /// [`RenderError::Shard`], and [`RenderError::Memory`] where `arena` has less than
+    /// [`IrradianceRenderer::footprint`].
+    #[doc(hidden)]
+    pub fn over(
+        (scene, bvh, lights): (&'a Scene<'a>, Bvh<'a>, LightSampler<'a>),
+        points: &[IrradiancePoint],
+        settings: &PointSettings,
+        arena: &mut Arena<'a>,
+        executor: &mut impl Executor,
+    ) -> Result<Self, RenderError> {
+        let PointSettings { seed, level, shard, .. } = *settings;
         let layout = Layout::of(points.len());
+        if shard.index >= shard.count || shard.count as usize > layout.tiles() {
+            return Err(RenderError::Shard);
+        }
         let (width, height) = (TILE, TILE * layout.tiles() as u32);
         let max_depth = settings.max_depth.unwrap_or(UNLIMITED);
-        let paths = PathSettings { width, height, seed: settings.seed, max_depth };
-        let level = settings.level;
+        let paths = PathSettings { width, height, seed, max_depth };
         let context = RenderContext { scene, bvh, lights, settings: paths, level, pilots: PilotSize::USUAL };
         let build = match Census::of(scene).plan().features {
             FeatureSet::Diffuse => {
-                Build::Diffuse(FeaturePoints::new(&context, points, settings.shard, arena, executor)?)
+                Build::Diffuse(FeaturePoints::new(&context, (points, settings), arena, executor)?)
             }
             FeatureSet::Opaque => {
-                Build::Opaque(FeaturePoints::new(&context, points, settings.shard, arena, executor)?)
+                Build::Opaque(FeaturePoints::new(&context, (points, settings), arena, executor)?)
             }
-            FeatureSet::All => {
-                Build::All(FeaturePoints::new(&context, points, settings.shard, arena, executor)?)
-            }
+            FeatureSet::All => Build::All(FeaturePoints::new(&context, (points, settings), arena, executor)?),
         };
         Ok(Self { build })
     }
@@ -156,6 +184,22 @@ impl<'a> IrradianceRenderer<'a> {
     /// [`RenderError::Memory`] where the scratch of `executor` is too small.
     pub fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
         of_build!(&mut self.build, renderer => renderer.step(executor, until))
+    }
+
+    /// As [`Until::Error`], with at most so many samples of each point.
+    ///
+    /// # Errors
+    /// Those of [`IrradianceRenderer::step`].
+    pub fn step_within(
+        &mut self,
+        executor: &mut impl Executor,
+        error: f64,
+        most: u32,
+    ) -> Result<(), RenderError> {
+        of_build!(&mut self.build, renderer => {
+            renderer.sample_within((error, most), executor)?;
+            Ok(renderer.estimate(executor)?)
+        })
     }
 
     /// Irradiance of each point, in the order of the points.
@@ -250,6 +294,10 @@ struct Parts<'a> {
     half_widths: &'a mut [f32],
     /// 1 for each tile that has reached the error.
     finished: &'a mut [u8],
+    /// Samples at which tiles are judged next.
+    decision: u32,
+    /// Error by which they were judged.
+    error: f64,
 }
 
 struct FeaturePoints<'a, F> {
@@ -260,13 +308,12 @@ struct FeaturePoints<'a, F> {
 impl<'a, F: Features> FeaturePoints<'a, F> {
     fn new(
         context: &RenderContext<'a>,
-        points: &[IrradiancePoint],
-        shard: Shard,
+        (points, settings): (&[IrradiancePoint], &PointSettings),
         arena: &mut Arena<'a>,
         executor: &mut impl Executor,
     ) -> Result<Self, RenderError> {
         let layout = Layout::of(points.len());
-        let state = RenderState::new(TILE, TILE * layout.tiles() as u32, shard, arena)?;
+        let state = RenderState::new(TILE, TILE * layout.tiles() as u32, settings.shard, arena)?;
         let pixels = layout.pixels();
         let (ordered, keys) = (arena.slice::<IrradiancePoint>(pixels)?, arena.slice::<u64>(pixels)?);
         let (places, half_widths) = (arena.slice::<u32>(pixels)?, arena.slice::<f32>(pixels)?);
@@ -293,14 +340,25 @@ impl<'a, F: Features> FeaturePoints<'a, F> {
         }
         half_widths.fill(f32::INFINITY);
         finished.fill(u8::from(!passed.is_complete));
-        let method = IrradiancePoints::new(context, ordered);
-        Ok(Self { method, parts: Parts { layout, places, state, half_widths, finished } })
+        let method = IrradiancePoints::new(context, ordered, settings.light);
+        Ok(Self {
+            method,
+            parts: Parts {
+                layout,
+                places,
+                state,
+                half_widths,
+                finished,
+                decision: FIRST_DECISION,
+                error: 0.0,
+            },
+        })
     }
 
     fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
         match until {
             Until::Samples(target) => self.sample(executor, target)?,
-            Until::Error(error) => self.sample_until(error, executor)?,
+            Until::Error(error) => self.sample_within((error, MOST_SAMPLES), executor)?,
         }
         self.estimate(executor)?;
         Ok(())
@@ -312,19 +370,26 @@ impl<'a, F: Features> FeaturePoints<'a, F> {
         self.method.round(round)
     }
 
-    /// Adds samples to the tiles that have not reached `error`, until all have.
-    fn sample_until<E: Executor>(&mut self, error: f64, executor: &mut E) -> Result<(), OutOfMemory> {
-        self.parts.finished.fill(0);
-        let mut target = FIRST_DECISION;
+    /// Adds samples to the tiles that have not reached `error`, until all have or have `most` samples. Tiles
+    /// are judged at numbers of samples of their own, so that the steps are of no matter.
+    fn sample_within<E: Executor>(
+        &mut self,
+        (error, most): (f64, u32),
+        executor: &mut E,
+    ) -> Result<(), OutOfMemory> {
+        self.parts.aim_at(error);
         while !executor.is_over() && self.parts.has_open_tiles() {
-            let Parts { state, finished, .. } = &mut self.parts;
-            let finished = &**finished;
+            let Parts { state, finished, decision, .. } = &mut self.parts;
+            let (finished, target, is_decision) = (&**finished, most.min(*decision), *decision <= most);
             let is_finished = |tile: usize| finished.get(tile).is_none_or(|finished| *finished != 0);
             let round = &mut Round { executor: &mut *executor, state, target, step: STEP };
             self.method.sample_unfinished(round, is_finished)?;
+            if executor.is_over() || !is_decision {
+                return Ok(());
+            }
             self.estimate(executor)?;
             self.parts.finish_tiles(error as f32);
-            target = fmin(ceil(f64::from(target) * sqrt(2.0)), f64::from(1u32 << 30)) as u32;
+            self.parts.decision = next_decision(target);
         }
         Ok(())
     }
@@ -354,7 +419,25 @@ impl<'a, F: Features> FeaturePoints<'a, F> {
     }
 }
 
+/// Samples at which tiles are judged after `samples`.
+fn next_decision(samples: u32) -> u32 {
+    fmin(ceil(f64::from(samples) * sqrt(2.0)), f64::from(MOST_SAMPLES)) as u32
+}
+
 impl Parts<'_> {
+    /// Opens all tiles where `error` is another than before.
+    fn aim_at(&mut self, error: f64) {
+        if self.error != error {
+            self.finished.fill(0);
+            self.error = error;
+            let samples = self.state.samples.iter().copied().max().unwrap_or_default();
+            self.decision = FIRST_DECISION;
+            while self.decision < samples {
+                self.decision = next_decision(self.decision);
+            }
+        }
+    }
+
     /// True if a tile of the shard has not reached the error.
     fn has_open_tiles(&self) -> bool {
         let shard = self.state.shard;

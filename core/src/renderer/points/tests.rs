@@ -5,7 +5,7 @@ use crate::memory::{Arena, Line};
 use crate::method::Loop;
 use crate::renderer::{RenderError, Until};
 use crate::scene::{Environment, Material, Mesh, PointLight, Scene, Triangle};
-use crate::transport::IrradiancePoint;
+use crate::transport::{IrradiancePoint, LightPart};
 use crate::{Level, Rgb};
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -50,13 +50,23 @@ fn values(
     until: Until,
     less: usize,
 ) -> Result<Vec<PointIrradiance>, RenderError> {
+    let settings = PointSettings { level: Level::BASELINE, ..PointSettings::default() };
+    with_settings(scene, points, &settings, until, less)
+}
+
+fn with_settings(
+    scene: &Scene,
+    points: &[IrradiancePoint],
+    settings: &PointSettings,
+    until: Until,
+    less: usize,
+) -> Result<Vec<PointIrradiance>, RenderError> {
     let memory = IrradianceRenderer::required_memory(scene, points.len());
     let mut lines = vec![Line::ZERO; memory.structures.div_ceil(64) - less];
     let mut scratch = vec![Line::ZERO; memory.scratch.div_ceil(64)];
     let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));
-    let settings = PointSettings { level: Level::BASELINE, ..PointSettings::default() };
     let mut arena = Arena::over(&mut lines);
-    let mut renderer = IrradianceRenderer::new(scene, points, &settings, &mut arena, &mut executor)?;
+    let mut renderer = IrradianceRenderer::new(scene, points, settings, &mut arena, &mut executor)?;
     renderer.step(&mut executor, until)?;
     Ok(renderer.values().collect())
 }
@@ -126,7 +136,7 @@ fn memory_is_exact_and_one_line_less_is_refused() {
         let refused = values(&scene, points, Until::Samples(1), 1);
         assert!(matches!(refused, Err(RenderError::Memory(_))), "{refused:?}");
     }
-    assert_eq!(values(&scene, &[], Until::Samples(1), 0), Err(RenderError::Size));
+    assert_eq!(values(&scene, &[], Until::Samples(1), 0), Err(RenderError::Points));
 }
 
 #[test]
@@ -156,4 +166,23 @@ fn a_single_point_has_replicates() {
     let value = values(&scene, &grid(0.0)[..1], Until::Samples(16), 0).unwrap()[0];
     assert_eq!(value.samples, 64 * 16);
     assert!(value.lower <= 2.0 * PI * 1.00001 && value.upper >= 2.0 * PI * 0.99999);
+}
+
+#[test]
+fn direct_and_indirect_light_are_all_light() {
+    let faces = [FLOOR[0], FLOOR[1], [4, 8, 11], [4, 11, 7], [4, 5, 9], [4, 9, 8]];
+    let (triangles, materials) = (triangles(&faces), [Material::diffuse(Rgb::splat(0.8))]);
+    let scene = scene(&triangles, &materials);
+    let points = [IrradiancePoint::free(Vec3::new(0.3, 0.0, 1.0), Vec3::Y)];
+    let mean = |light, max_depth| {
+        let settings = PointSettings { level: Level::BASELINE, light, max_depth, ..PointSettings::default() };
+        let value = with_settings(&scene, &points, &settings, Until::Samples(1 << 12), 0).unwrap()[0];
+        (value.value(), 0.5 * (value.upper - value.lower))
+    };
+    let parts = [LightPart::All, LightPart::Direct, LightPart::Indirect].map(|part| mean(part, None));
+    let [(all, a), (direct, b), (indirect, c)] = parts;
+    assert!((direct + indirect - all).abs() < 2.0 * (a + b + c), "{parts:?}");
+    assert!(indirect > 0.05 * all && indirect > 4.0 * c, "{parts:?}");
+    let (short, d) = mean(LightPart::All, Some(2));
+    assert!((short - direct).abs() < 2.0 * (b + d));
 }

@@ -32,7 +32,7 @@ pub(in crate::transport) mod silhouette;
 
 pub use crate::transport::wavefront::WAVE;
 pub use estimator::LightEstimator;
-pub use points::IrradiancePoint;
+pub use points::{IrradiancePoint, LightPart};
 pub use reuse::PathReuse;
 pub use sharing::Sharing;
 

@@ -5,7 +5,7 @@
 //! the baseline level. The first vertex is shaded alone; the paths behind it advance as those of pixels do.
 
 use super::PathIntegrator;
-use super::estimator::{LightEstimator, PathVertex};
+use super::estimator::{LightEstimator, PathVertex, RemainingLight};
 use super::shade::Path;
 use super::sharing::PathWave;
 use crate::Rgb;
@@ -35,6 +35,18 @@ const LIES_ON: f32 = 4.0;
 
 /// Bound of the rounding of a coordinate that a few operations have computed, relative to the coordinate.
 const POINT_ROUNDING: f32 = 16.0 * f32::EPSILON;
+
+/// Light of which the irradiance is estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightPart {
+    /// All light.
+    #[default]
+    All,
+    /// Light directly from emitters.
+    Direct,
+    /// Light that surfaces have scattered.
+    Indirect,
+}
 
 /// A point with a normal, at which irradiance is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -150,7 +162,7 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn sample_irradiance(
         &self,
-        points: &[IrradiancePoint],
+        (points, part): (&[IrradiancePoint], LightPart),
         samples: Range<u32>,
         wave: usize,
         scratch: &mut Arena,
@@ -170,7 +182,7 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
                 count += 1;
             }
             counters.paths += count as u64;
-            self.leave_points(points, &mut wave, count, &mut counters);
+            self.leave_points((points, part), &mut wave, count, &mut counters);
             for i in 0..count {
                 let path = wave.wave.paths[i];
                 if let Some(pixel) = out.get_mut(path.place as usize) {
@@ -185,7 +197,7 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
     /// the paths to their ends.
     fn leave_points(
         &self,
-        points: &[IrradiancePoint],
+        (points, part): (&[IrradiancePoint], LightPart),
         wave: &mut PathWave<E::State, ()>,
         count: usize,
         counters: &mut Counters,
@@ -197,7 +209,7 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
                 wave.wave.trace_shadow_rays(&self.context, counters);
             }
             let Some(point) = points.get(wave.wave.paths[i].place as usize) else { continue };
-            self.leave_point(&point.surface(), wave, i, counters);
+            self.leave_point((&point.surface(), part), wave, i, counters);
         }
         wave.wave.trace_shadow_rays(&self.context, counters);
         let count = wave.wave.next;
@@ -208,7 +220,7 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
     /// Light sample and next ray of path `i` at its point.
     fn leave_point(
         &self,
-        point: &SurfacePoint<'a>,
+        (point, part): (&SurfacePoint<'a>, LightPart),
         PathWave { wave, memory }: &mut PathWave<E::State, ()>,
         i: usize,
         counters: &mut Counters,
@@ -237,7 +249,13 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
             rest: path.classes,
         };
         let Some(Path { path, state, shared }) = memory.path(wave.paths, i, &mut none) else { return };
-        let rest = self.known(Path { path, state, shared }, &vertex, E::Found::default());
+        let rest = match part {
+            LightPart::All => self.known(Path { path, state, shared }, &vertex, E::Found::default()),
+            LightPart::Direct => RemainingLight::of(PathClasses::EMITTED),
+            LightPart::Indirect => {
+                RemainingLight { is_lit: true, ..RemainingLight::of(PathClasses::SCATTERED) }
+            }
+        };
         let state = memory.states.get(i).unwrap_or(&none.0);
         self.direct((state, &mut ()), &vertex, &rest, wave);
         if rest.ends {

@@ -31,6 +31,8 @@ impl PathClasses {
     pub(in crate::transport) const DIRECT: Self = Self(Self::ALL.0 & !ROUGH);
     /// Light that non-specular surfaces reflect: gather rays of a record find it.
     pub(in crate::transport) const REFLECTED: Self = Self(ROUGH | GATHERED);
+    /// Light that surfaces scatter; light samples or other paths supply that of emitters.
+    pub(in crate::transport) const SCATTERED: Self = Self(Self::ALL.0 & !(EMISSION | ENVIRONMENT));
     /// Light directly from emitters; photons supply the rest.
     pub(in crate::transport) const EMITTED: Self = Self(EMISSION | ENVIRONMENT);
     /// All light except caustics, with photon maps: the path may end at the next surface with a diffuse part.
