@@ -114,9 +114,12 @@ pub use method::{
     BidirectionalSettings, CacheOptions, Executor, LobeSettings, Loop, Method, MethodKind,
     MetropolisSettings, Passed, PathOptions, PhotonSettings, Shard, VirtualLightSettings, Worker,
 };
-pub use renderer::{RenderError, Renderer, RequiredMemory, Settings, Until};
+pub use renderer::{
+    IrradianceRenderer, PointIrradiance, PointSettings, RenderError, Renderer, RequiredMemory, Settings,
+    Until,
+};
 pub use scene::Scene;
-pub use transport::Counters;
+pub use transport::{Counters, IrradiancePoint, LightPart};
 
 /// Linear sRGB triple: radiance in W/(m² sr), reflectance, throughput; one meaning per use.
 pub type Rgb = glam::Vec3;

@@ -3,6 +3,7 @@
 mod audited;
 mod error;
 mod of_features;
+mod points;
 mod rounds;
 mod settings;
 
@@ -11,6 +12,7 @@ pub use crate::audit::{AuditWork, Audited, ErrorReport, NoiseAndBlur, Region};
 pub use audited::OutOfReach;
 pub use error::RenderError;
 pub use of_features::FeatureRenderer;
+pub use points::{IrradianceRenderer, PointIrradiance, PointSettings};
 #[doc(hidden)]
 pub use rounds::{Estimates, Plan, Rounds, Stop, StopRule};
 pub use settings::{RequiredMemory, Settings, Until};

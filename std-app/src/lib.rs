@@ -20,6 +20,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod bake;
 mod cgroup;
 pub mod compare;
 mod error;

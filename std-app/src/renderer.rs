@@ -1,11 +1,14 @@
 //! Renderer of a loaded scene: one build for many views.
 
+use crate::bake::{BakeSettings, Baked};
 use crate::error::Error;
 use crate::load::{self, LoadOptions, LoadedScene, SceneViews, View};
-use crate::render::{Built, BuiltMemory, Pool, Progress, RenderError, RenderResult, Request, Settings};
+use crate::render::{
+    Built, BuiltMemory, Pool, Progress, RenderError, RenderResult, Request, Settings, with_points,
+};
 use core::sync::atomic::AtomicBool;
-use halflight_core::Level;
 pub use halflight_core::scene::Camera;
+use halflight_core::{IrradiancePoint, Level};
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -115,6 +118,18 @@ impl Renderer {
         let scene = views.scene(camera);
         let pool = self.pool(settings.threads)?;
         Ok(Request::open(&scene, settings)?.render(built, &pool, progress, interrupt)?)
+    }
+
+    /// Irradiance of `points`, with intervals.
+    ///
+    /// # Errors
+    /// Those of [`crate::bake::irradiance`].
+    pub fn irradiance(&self, points: &[IrradiancePoint], settings: &BakeSettings) -> Result<Baked, Error> {
+        let OfScene { views, built } = self.scene.borrow_dependent();
+        let scene = views.scene(self.scene().camera_or_default());
+        let pool = self.pool(settings.threads)?;
+        let never = AtomicBool::new(false);
+        Ok(with_points((&scene, built), (points, settings), &pool, &mut |_| {}, &never)?)
     }
 
     /// The pool of so many threads.

@@ -2,6 +2,7 @@
 //! functions.
 
 mod audit;
+mod bake;
 mod caustics;
 mod cli;
 mod compare;

@@ -8,7 +8,7 @@ use halflight_core::Level;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
-use halflight_core::film::Film;
+use halflight_core::film::{Dropped, Film, Pixel};
 use halflight_core::geometry::Ray;
 use halflight_core::memory::Arena;
 use halflight_core::sampling::Sampler;
@@ -16,7 +16,9 @@ use halflight_core::scene::{Camera, Scene, SurfacePoint};
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::path::reference;
-use halflight_core::transport::{Counters, PathIntegrator, PathSettings, UNLIMITED};
+use halflight_core::transport::{
+    Counters, IrradiancePoint, LightPart, PathIntegrator, PathSettings, UNLIMITED,
+};
 use halflight_tests::memory::{TestArena, with_structures};
 use halflight_tests::scenes::{
     SceneBuffers, constant_environment, cornell_box, emitter, everything, room_with_lamp,
@@ -218,4 +220,35 @@ fn an_interrupted_picture_is_valid() {
     let result = render::render(&scene.scene(), &settings, &mut raise, &flag).unwrap();
     assert_eq!((result.ending, result.spp), (render::Ending::Interrupted, 1));
     assert!(result.image.mean()[0] > 0.05);
+}
+
+#[test]
+fn irradiance_at_points_is_the_textbook_to_the_bit_for_any_wave() {
+    for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0)] {
+        let scene = buffers.scene();
+        let settings = PathSettings { width: 1, height: 1, seed: 3, max_depth: UNLIMITED };
+        with_structures(&scene, |bvh, lights| {
+            let tracer = PathIntegrator::<All>::new(&scene, bvh, lights, settings, Level::BASELINE);
+            let on = |triangle| IrradiancePoint::on_triangle(&scene, triangle, [0.3, 0.4], triangle % 2 == 0);
+            let points: Vec<IrradiancePoint> =
+                (0..12).filter_map(on).zip(5..).map(|(point, number)| point.numbered(number)).collect();
+            for wave in [1, 100, 5000] {
+                let mut scratch_memory = TestArena::new(PathIntegrator::<All>::scratch(wave));
+                let mut film = vec![Pixel::default(); points.len()];
+                tracer
+                    .sample_irradiance(&points, 0..3, wave, &mut scratch_memory.arena(), &mut film)
+                    .unwrap();
+                for (point, pixel) in points.iter().zip(&film) {
+                    let mut expected = Pixel::default();
+                    for sample in 0..3 {
+                        let sampler = Sampler::new(3, point.number, sample);
+                        let surface = point.surface();
+                        let value = reference::irradiance(&scene, bvh, lights, UNLIMITED, &sampler, &surface);
+                        expected.add(sample, value, &mut Dropped::default());
+                    }
+                    assert_eq!(*pixel, expected, "{point:?}");
+                }
+            }
+        });
+    }
 }

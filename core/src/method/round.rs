@@ -124,12 +124,26 @@ impl<E: Executor> Round<'_, '_, E> {
         end: u32,
         sample: impl Fn(usize, Range<u32>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync,
     ) -> Result<(), OutOfMemory> {
+        self.open_tiles(end, |_| true, sample)
+    }
+
+    /// As [`Round::tiles`], for the tiles that are open.
+    ///
+    /// # Errors
+    /// Those of [`Round::tiles`].
+    pub fn open_tiles(
+        &mut self,
+        end: u32,
+        is_open: impl Fn(usize) -> bool + Send,
+        sample: impl Fn(usize, Range<u32>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync,
+    ) -> Result<(), OutOfMemory> {
         let (end, step) = (end.min(self.target), self.step.max(1));
         let RenderState { film, samples, dropped, shard, counters, .. } = &mut *self.state;
         let pixels = film.pixels_mut().chunks_mut(PIXELS_PER_TILE);
         let tiles = pixels.zip(samples.iter_mut()).zip(dropped.iter_mut()).enumerate();
         let shard = *shard;
-        let open = tiles.filter(move |(tile, ((_, taken), _))| shard.owns(*tile) && **taken < end);
+        let open =
+            tiles.filter(move |(tile, ((_, taken), _))| shard.owns(*tile) && **taken < end && is_open(*tile));
         let passed =
             self.executor.pass_scattered(open, |_, (tile, ((pixels, taken), dropped)), worker| {
                 let mut counters = Counters::default();

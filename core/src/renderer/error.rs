@@ -9,6 +9,8 @@ use core::fmt;
 pub enum RenderError {
     /// The picture has no pixel, or more than 2^28.
     Size,
+    /// There is no point, or more than 2^30.
+    Points,
     /// The shard does not exist.
     Shard,
     /// The fraction of the audit is negative, 1 or more, or no number.
@@ -24,6 +26,7 @@ impl fmt::Display for RenderError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             RenderError::Size => write!(f, "a picture has 1 to 2^28 pixels"),
+            RenderError::Points => write!(f, "there must be between 1 and 2^30 points"),
             RenderError::Shard => write!(f, "the shard does not exist"),
             RenderError::Audit => write!(f, "the fraction of an audit is from 0 to below 1"),
             RenderError::Triangle(index) => {

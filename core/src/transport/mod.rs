@@ -27,7 +27,7 @@ mod wavefront;
 pub use cached::lookup::{CacheView, SuppliedLobes};
 pub use caustics::merge::CausticMerging;
 pub use path::reuse_pilot::Pilot;
-pub use path::{LightEstimator, PathIntegrator, PathReuse, Sharing};
+pub use path::{IrradiancePoint, LightEstimator, LightPart, PathIntegrator, PathReuse, Sharing};
 pub use photon_mapping::density::PhotonLight;
 pub use photon_mapping::radius::RadiusSchedule;
 pub use prepass::environment_visibility::{VisibilityGain, VisibilityPrepass, VisibilityVertex};

@@ -222,7 +222,11 @@ impl Wavefront<'_> {
     }
 
     /// Traces the queue of shadow rays, and adds the light of unoccluded ones to their paths.
-    fn trace_shadow_rays<F: Features>(&mut self, context: &SceneContext<F>, counters: &mut Counters) {
+    pub(crate) fn trace_shadow_rays<F: Features>(
+        &mut self,
+        context: &SceneContext<F>,
+        counters: &mut Counters,
+    ) {
         let Self { paths, shadows, .. } = self;
         shadows.trace(context, counters, |ray, light| {
             let tag = ShadowTag(ray.tag);

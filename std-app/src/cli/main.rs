@@ -2,6 +2,7 @@
 //! docs/cli.md its interface for scripts.
 #![forbid(unsafe_code)]
 
+mod bake;
 mod camera_args;
 mod compare;
 mod failure;
@@ -40,6 +41,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    Bake(Box<bake::Bake>),
     Compare(compare::Compare),
     Merge(merge::Merge),
     Race(Box<race::Race>),
@@ -51,6 +53,7 @@ impl Command {
     fn threads(&self) -> Option<usize> {
         match self {
             Command::Render(command) => command.threads(),
+            Command::Bake(command) => command.threads(),
             Command::Race(command) => command.threads(),
             _ => None,
         }
@@ -59,6 +62,7 @@ impl Command {
     fn run(&self) -> Result<ExitCode, Failure> {
         match self {
             Command::Render(command) => command.run(),
+            Command::Bake(command) => command.run(),
             Command::Compare(command) => command.run(),
             Command::Merge(command) => command.run(),
             Command::Race(command) => command.run(),

@@ -6,7 +6,7 @@ use super::interrupt::INTERRUPT;
 use super::stdio::{print_message, print_result};
 use halflight::report::{self, Files};
 use halflight::save::{self, Destination, Identity, Image, Patience};
-use std::io::{stderr, stdout};
+use std::io::{self, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -20,6 +20,8 @@ pub(super) enum Role {
     Default,
     /// Film of `--checkpoint`.
     Checkpoint,
+    /// Table of `bake`.
+    Table,
     /// Irradiance caches of `--save-cache`.
     Cache,
     /// File of a report.
@@ -32,7 +34,7 @@ impl Role {
     /// Flag or words that name the output in messages.
     const fn label(self) -> &'static str {
         match self {
-            Role::Picture => "-o",
+            Role::Picture | Role::Table => "-o",
             Role::Default => "the picture, without -o",
             Role::Checkpoint => "--checkpoint",
             Role::Cache => "--save-cache",
@@ -89,7 +91,7 @@ impl Outputs {
     pub(super) fn plan(&mut self, role: Role, path: &Path) -> Result<(), Failure> {
         match role {
             Role::Picture | Role::Default => save::check_writable(path)?,
-            Role::Checkpoint | Role::Cache => save::check_destination(path)?,
+            Role::Checkpoint | Role::Cache | Role::Table => save::check_destination(path)?,
             Role::Report | Role::Standard => {}
         }
         if Destination::of(path).is_ok_and(|destination| destination.is_stdout()) {
@@ -161,6 +163,13 @@ impl Outputs {
         order.retain(|&i| self.save(&paths[i], image));
         order.sort_unstable();
         order.into_iter().map(|i| &paths[i]).collect()
+    }
+
+    /// Writes a table.
+    pub(super) fn save_table(&mut self, path: &Path, put: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
+        if let Err(error) = save::write_bytes(path, put, self.patience()) {
+            self.fail(error);
+        }
     }
 
     /// Writes a report; returns whether all of it was written.

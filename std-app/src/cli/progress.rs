@@ -27,6 +27,18 @@ impl ProgressReporter {
         Self { bar, last_line: 0.0 }
     }
 
+    /// Reports `text` after so many seconds, with those that are left if they are limited.
+    pub(super) fn report_text(&mut self, text: &str, seconds: f64, left: Option<f64>) {
+        let done = left.map_or(0.0, |left| seconds / (seconds + left).max(1e-9));
+        if let Some(bar) = &self.bar {
+            bar.set_position((done * STEPS as f64) as u64);
+            bar.set_message(escaped(text).into_owned());
+        } else if seconds >= self.last_line + INTERVAL {
+            self.last_line = seconds;
+            print_message(format_args!("{:>3.0} %  {text}", 100.0 * done));
+        }
+    }
+
     /// Reports a round of the render `name`, which is empty for a single render.
     pub(super) fn report(&mut self, name: &str, progress: &Progress) {
         let separator = if name.is_empty() { "" } else { ": " };
@@ -35,15 +47,7 @@ impl ProgressReporter {
             let note = || print_note(format_args!("{error}; the render continues and tries again"));
             self.bar.as_ref().map_or_else(note, |bar| bar.suspend(note));
         }
-        let left = progress.seconds_left;
-        let done = left.map_or(0.0, |left| progress.seconds / (progress.seconds + left).max(1e-9));
-        if let Some(bar) = &self.bar {
-            bar.set_position((done * STEPS as f64) as u64);
-            bar.set_message(escaped(&text).into_owned());
-        } else if progress.seconds >= self.last_line + INTERVAL {
-            self.last_line = progress.seconds;
-            print_message(format_args!("{:>3.0} %  {text}", 100.0 * done));
-        }
+        self.report_text(&text, progress.seconds, progress.seconds_left);
     }
 
     /// Removes the bar.

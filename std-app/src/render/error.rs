@@ -23,6 +23,8 @@ pub enum RenderError {
     Shard,
     /// A cache is to be loaded or saved, but the method has none.
     NoCache,
+    /// The core refuses the mesh, the points or the shard.
+    Core(halflight_core::RenderError),
     /// A film or cache file cannot be used.
     File(FileError),
 }
@@ -51,6 +53,7 @@ impl core::fmt::Display for RenderError {
             Self::NoCache => {
                 write!(f, "only the methods irradiance-cache and radiance-cache have a cache to load or save")
             }
+            Self::Core(error) => error.fmt(f),
             Self::File(error) => error.fmt(f),
         }
     }
@@ -61,6 +64,15 @@ impl core::error::Error for RenderError {}
 impl From<OutOfMemory> for RenderError {
     fn from(error: OutOfMemory) -> Self {
         Self::Memory { needed: error.needed, available: error.available }
+    }
+}
+
+impl From<halflight_core::RenderError> for RenderError {
+    fn from(error: halflight_core::RenderError) -> Self {
+        match error {
+            halflight_core::RenderError::Memory(error) => error.into(),
+            error => Self::Core(error),
+        }
     }
 }
 

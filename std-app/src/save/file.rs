@@ -62,6 +62,18 @@ pub fn write_with(path: &Path, image: &Image, patience: Patience) -> Result<(), 
     replace(path, &bytes, patience)
 }
 
+/// Writes the output of `put`, which is no picture, to a file, pipe or device.
+///
+/// # Errors
+/// A file that cannot be written; the message names it.
+pub fn write_bytes(
+    path: &Path,
+    put: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    patience: Patience,
+) -> Result<(), FileError> {
+    replace_with(path, patience, put)
+}
+
 /// Writes `bytes` to a file atomically.
 pub(crate) fn replace(path: &Path, bytes: &[u8], patience: Patience) -> Result<(), FileError> {
     replace_with(path, patience, |file| file.write_all(bytes))

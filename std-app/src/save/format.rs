@@ -1,6 +1,6 @@
 //! File formats of pictures, and their encoders.
 
-use super::{Image, to_srgb};
+use super::{Image, display_byte};
 use crate::picture::{FileError, MAX_PIXELS, fail};
 use exr::image::{Blocks, Encoding, SpecificChannels};
 use exr::math::Vec2;
@@ -72,7 +72,7 @@ pub fn encode(image: &Image, format: Format) -> Result<Vec<u8>, FileError> {
 }
 
 fn encode_png(picture: &Image) -> Result<Vec<u8>, FileError> {
-    let display = |&value: &f32| (to_srgb(value) * 255.0 + 0.5) as u8;
+    let display = |&value: &f32| display_byte(value);
     let samples: Vec<u8> = picture.pixels.iter().flatten().map(display).collect();
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)

@@ -65,6 +65,11 @@ pub fn to_srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// Linear value to the byte of a display.
+pub fn display_byte(linear: f32) -> u8 {
+    (to_srgb(linear) * 255.0 + 0.5) as u8
+}
+
 /// Display value to linear value, the inverse of [`to_srgb`].
 pub fn from_srgb(display: f32) -> f32 {
     if display <= 0.040_45 { display / 12.92 } else { ((display + 0.055) / 1.055).powf(2.4) }

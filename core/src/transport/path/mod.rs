@@ -22,6 +22,7 @@ mod direct;
 pub(in crate::transport) mod estimator;
 mod lanes;
 pub(in crate::transport) mod pixels;
+mod points;
 #[cfg(feature = "reference")]
 pub mod reference;
 pub(in crate::transport) mod reuse;
@@ -33,6 +34,7 @@ pub mod single;
 
 pub use crate::transport::wavefront::WAVE;
 pub use estimator::LightEstimator;
+pub use points::{IrradiancePoint, LightPart};
 pub use reuse::PathReuse;
 pub use sharing::Sharing;
 

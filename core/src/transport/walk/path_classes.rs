@@ -31,6 +31,8 @@ impl PathClasses {
     pub(crate) const DIRECT: Self = Self(Self::ALL.0 & !ROUGH);
     /// Light that non-specular surfaces reflect: gather rays of a record find it.
     pub(crate) const REFLECTED: Self = Self(ROUGH | GATHERED);
+    /// Light that surfaces scatter; light samples or other paths supply that of emitters.
+    pub(crate) const SCATTERED: Self = Self(Self::ALL.0 & !(EMISSION | ENVIRONMENT));
     /// Light directly from emitters; photons supply the rest.
     pub(crate) const EMITTED: Self = Self(EMISSION | ENVIRONMENT);
     /// All light except caustics, with photon maps: the path may end at the next surface with a diffuse part.

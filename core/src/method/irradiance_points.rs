@@ -1,0 +1,60 @@
+//! Irradiance at many points by path tracing (Kajiya 1986): a film whose pixels are points.
+
+use super::executor::Executor;
+use super::{RenderContext, RenderMethod, Round};
+use crate::bsdf::Features;
+use crate::film::PIXELS_PER_TILE;
+use crate::memory::{Footprint, OutOfMemory};
+use crate::transport::path::WAVE;
+use crate::transport::{IrradiancePoint, LightPart, PathIntegrator};
+
+/// Irradiance at the points of one scene. Pixel `i` of the film is point `i`.
+#[derive(Clone, Copy)]
+pub struct IrradiancePoints<'a, F> {
+    integrator: PathIntegrator<'a, F>,
+    points: &'a [IrradiancePoint],
+    part: LightPart,
+}
+
+impl<'a, F: Features> IrradiancePoints<'a, F> {
+    /// Working memory of a worker.
+    pub fn scratch() -> Footprint {
+        PathIntegrator::<F>::scratch(WAVE)
+    }
+
+    /// Path tracing of this part of the light at `points`.
+    pub fn new(context: &RenderContext<'a>, points: &'a [IrradiancePoint], part: LightPart) -> Self {
+        Self { integrator: context.integrator(), points, part }
+    }
+
+    /// The points, in the order of the film.
+    pub fn points(&self) -> &'a [IrradiancePoint] {
+        self.points
+    }
+
+    /// Samples of the tiles that are not `finished`.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the scratch of the executor is too small.
+    pub fn sample_unfinished<E: Executor>(
+        &self,
+        round: &mut Round<E>,
+        finished: impl Fn(usize) -> bool + Send + Sync,
+    ) -> Result<(), OutOfMemory> {
+        let Self { integrator, points, part } = self;
+        round.open_tiles(
+            u32::MAX,
+            |tile| !finished(tile),
+            |tile, samples, scratch, pixels| {
+                let of_tile = points.chunks(PIXELS_PER_TILE).nth(tile).unwrap_or(&[]);
+                integrator.sample_irradiance((of_tile, *part), samples, WAVE, scratch, pixels)
+            },
+        )
+    }
+}
+
+impl<F: Features> RenderMethod for IrradiancePoints<'_, F> {
+    fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
+        self.sample_unfinished(round, |_| false)
+    }
+}

@@ -1,0 +1,497 @@
+//! Irradiance at points, each with a 95 % interval, in the caller's memory and on the caller's threads.
+
+use super::{RenderError, RequiredMemory, Until};
+use crate::bsdf::{All, DiffuseTextured, Features, Opaque};
+use crate::bvh::Bvh;
+use crate::census::{Census, FeatureSet};
+use crate::estimate::{POOLED_POINTS, half_width, point_variances};
+use crate::film::{PIXELS_PER_TILE, Pixel, TILE};
+use crate::light::{LightSampler, luminance};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::method::{
+    Executor, IrradiancePoints, PilotSize, RenderContext, RenderMethod, RenderState, Round, Shard,
+};
+use crate::scene::Scene;
+use crate::transport::{Counters, IrradiancePoint, LightPart, PathSettings, UNLIMITED};
+use crate::{Level, Rgb};
+use glam::Vec3;
+use libm::{ceil, fmin, sqrt};
+
+/// Samples of a tile between two questions whether the executor is over.
+const STEP: u32 = 16;
+
+/// Samples at the first look at the intervals of a tile.
+const FIRST_DECISION: u32 = 64;
+
+/// Fraction of the points of a finished tile whose intervals are within the error.
+const WITHIN: f64 = 0.95;
+
+/// Offset of relative errors, in means of all points.
+const OFFSET: f32 = 0.1;
+
+/// Points of a task that prepares points.
+const CHUNK: usize = 1024;
+
+/// Most points: numbers have 31 bits beside the Z-curve.
+const MOST_POINTS: usize = 1 << 30;
+
+/// Most samples of a point.
+const MOST_SAMPLES: u32 = 1 << 30;
+
+/// Settings of irradiance at points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointSettings {
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Most segments of a path; 2 is direct light. `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Highest instruction set to use. [`Level::BASELINE`] gives the same bits on every target.
+    pub level: Level,
+    /// Part of the points to estimate, in tiles of 256 near points.
+    pub shard: Shard,
+    /// Light to estimate.
+    pub light: LightPart,
+}
+
+impl Default for PointSettings {
+    fn default() -> Self {
+        Self { seed: 0, max_depth: None, level: Level::detect(), shard: Shard::WHOLE, light: LightPart::All }
+    }
+}
+
+/// Irradiance of a point and its interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointIrradiance {
+    /// Irradiance in W/m² on the side of the normal.
+    pub irradiance: Rgb,
+    /// Lower end of the 95 % interval of its luminance.
+    pub lower: f32,
+    /// Upper end; infinite below four samples.
+    pub upper: f32,
+    /// Number of samples.
+    pub samples: u32,
+}
+
+impl PointIrradiance {
+    /// Luminance of the irradiance.
+    pub fn value(&self) -> f32 {
+        luminance(self.irradiance)
+    }
+}
+
+/// Irradiance of many points in progress.
+pub struct IrradianceRenderer<'a> {
+    build: Build<'a>,
+}
+
+enum Build<'a> {
+    Diffuse(FeaturePoints<'a, DiffuseTextured>),
+    Opaque(FeaturePoints<'a, Opaque>),
+    All(FeaturePoints<'a, All>),
+}
+
+/// Runs `$work` on the build of a renderer.
+macro_rules! of_build {
+    ($build:expr, $renderer:ident => $work:expr) => {
+        match $build {
+            Build::Diffuse($renderer) => $work,
+            Build::Opaque($renderer) => $work,
+            Build::All($renderer) => $work,
+        }
+    };
+}
+
+impl<'a> IrradianceRenderer<'a> {
+    /// Memory for so many points in `scene`, before anything is built.
+    pub fn required_memory(scene: &Scene, points: usize) -> RequiredMemory {
+        let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
+        let structures =
+            Bvh::footprint(scene.mesh.triangles.len()).and(lights).and(Layout::of(points).footprint());
+        RequiredMemory { structures: structures.bytes(), scratch: IrradiancePoints::<All>::scratch().bytes() }
+    }
+
+    /// Builds the hierarchy and the lights of `scene`, whose camera is of no matter. Points that lie on a
+    /// surface within rounding are put on it, on the side of their normals.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`] where `arena` or the scratch of `executor` has less than
+    /// [`IrradianceRenderer::required_memory`]; others where there is no point or the mesh is damaged.
+    pub fn new(
+        scene: &'a Scene<'a>,
+        points: &[IrradiancePoint],
+        settings: &PointSettings,
+        arena: &mut Arena<'a>,
+        executor: &mut impl Executor,
+    ) -> Result<Self, RenderError> {
+        if !(1..=MOST_POINTS).contains(&points.len()) {
+            return Err(RenderError::Points);
+        }
+        scene.mesh.validate(scene.materials.len()).map_err(RenderError::Triangle)?;
+        let needed = Self::required_memory(scene, points.len()).structures;
+        if arena.available() < needed {
+            return Err(OutOfMemory { needed, available: arena.available() }.into());
+        }
+        let bvh = Bvh::build_with(&scene.mesh, arena, settings.level, executor.fork())?;
+        let lights = LightSampler::build(scene, arena)?.with_level(settings.level);
+        Self::over((scene, bvh, lights), points, settings, arena, executor)
+    }
+
+    /// Memory of the points alone, beside structures of the scene that exist.
+    #[doc(hidden)]
+    pub fn footprint(points: usize) -> Footprint {
+        Layout::of(points).footprint()
+    }
+
+    /// As [`IrradianceRenderer::new`], over structures of the scene that exist.
+    ///
+    /// # Errors
+    /// [`RenderError::Shard`], and [`RenderError::Memory`] where `arena` has less than
+    /// [`IrradianceRenderer::footprint`].
+    #[doc(hidden)]
+    pub fn over(
+        (scene, bvh, lights): (&'a Scene<'a>, Bvh<'a>, LightSampler<'a>),
+        points: &[IrradiancePoint],
+        settings: &PointSettings,
+        arena: &mut Arena<'a>,
+        executor: &mut impl Executor,
+    ) -> Result<Self, RenderError> {
+        let PointSettings { seed, level, shard, .. } = *settings;
+        let layout = Layout::of(points.len());
+        if shard.index >= shard.count || shard.count as usize > layout.tiles() {
+            return Err(RenderError::Shard);
+        }
+        let (width, height) = (TILE, TILE * layout.tiles() as u32);
+        let max_depth = settings.max_depth.unwrap_or(UNLIMITED);
+        let paths = PathSettings { width, height, seed, max_depth };
+        let context = RenderContext { scene, bvh, lights, settings: paths, level, pilots: PilotSize::USUAL };
+        let build = match Census::of(scene).plan().features {
+            FeatureSet::Diffuse => {
+                Build::Diffuse(FeaturePoints::new(&context, (points, settings), arena, executor)?)
+            }
+            FeatureSet::Opaque => {
+                Build::Opaque(FeaturePoints::new(&context, (points, settings), arena, executor)?)
+            }
+            FeatureSet::All => Build::All(FeaturePoints::new(&context, (points, settings), arena, executor)?),
+        };
+        Ok(Self { build })
+    }
+
+    /// Adds samples to each point `until` the given end, or until the executor is over. By an error, tiles of
+    /// near points end one by one: when the half-widths of 95 % of the points of a tile are at most the
+    /// error times (E + 0.1 of the mean of all points).
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`] where the scratch of `executor` is too small.
+    pub fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
+        of_build!(&mut self.build, renderer => renderer.step(executor, until))
+    }
+
+    /// As [`Until::Error`], with at most so many samples of each point.
+    ///
+    /// # Errors
+    /// Those of [`IrradianceRenderer::step`].
+    pub fn step_within(
+        &mut self,
+        executor: &mut impl Executor,
+        error: f64,
+        most: u32,
+    ) -> Result<(), RenderError> {
+        of_build!(&mut self.build, renderer => {
+            renderer.sample_within((error, most), executor)?;
+            Ok(renderer.estimate(executor)?)
+        })
+    }
+
+    /// Irradiance of each point, in the order of the points.
+    pub fn values(&self) -> impl Iterator<Item = PointIrradiance> + '_ {
+        let Parts { layout, places, state, half_widths, .. } = self.parts();
+        let each = places.chunks(layout.replicates);
+        each.map(move |places| PointIrradiance::of_replicates(places, &state.film.pixels(), half_widths))
+    }
+
+    /// Samples of the least sampled point.
+    pub fn samples(&self) -> u32 {
+        self.parts().state.spp()
+    }
+
+    /// Number of tiles of near points, and of those that have reached the error of the last step.
+    pub fn tiles(&self) -> [usize; 2] {
+        let Parts { finished, state, .. } = self.parts();
+        [state.tiles(), finished.iter().filter(|finished| **finished != 0).count()]
+    }
+
+    /// Sums of the samples. Pixels are points along a Z-curve.
+    pub fn state(&self) -> &RenderState<'a> {
+        &self.parts().state
+    }
+
+    /// Rays and rejected samples so far.
+    pub fn counters(&self) -> Counters {
+        self.parts().state.counters
+    }
+
+    fn parts(&self) -> &Parts<'a> {
+        of_build!(&self.build, renderer => &renderer.parts)
+    }
+}
+
+impl PointIrradiance {
+    /// Mean of the replicates of a point at these `places` of the film.
+    fn of_replicates(places: &[u32], pixels: &[Pixel], half_widths: &[f32]) -> Self {
+        let (mut sum, mut squares, mut samples) = (Rgb::ZERO, 0.0, 0);
+        for &place in places {
+            let pixel = pixels.get(place as usize).copied().unwrap_or_default();
+            let half_width = half_widths.get(place as usize).copied().unwrap_or(f32::INFINITY);
+            sum += pixel.mean();
+            squares += half_width * half_width;
+            samples += pixel.count();
+        }
+        let count = places.len().max(1) as f32;
+        let (irradiance, half_width) = (sum / count, libm::sqrtf(squares) / count);
+        let value = luminance(irradiance);
+        Self { irradiance, lower: (value - half_width).max(0.0), upper: value + half_width, samples }
+    }
+}
+
+/// Points of a film and their replicates.
+#[derive(Clone, Copy)]
+struct Layout {
+    points: usize,
+    /// Pixels of each point, so that few points are pooled as well.
+    replicates: usize,
+}
+
+impl Layout {
+    fn of(points: usize) -> Self {
+        Self { points, replicates: POOLED_POINTS.div_ceil(points.clamp(1, POOLED_POINTS)) }
+    }
+
+    fn pixels(&self) -> usize {
+        self.points * self.replicates
+    }
+
+    fn tiles(&self) -> usize {
+        self.pixels().div_ceil(PIXELS_PER_TILE)
+    }
+
+    fn footprint(&self) -> Footprint {
+        let film = RenderState::footprint(TILE, TILE * self.tiles() as u32);
+        film.slice::<IrradiancePoint>(self.pixels())
+            .slice::<u64>(self.pixels())
+            .slice::<u32>(self.pixels())
+            .slice::<f32>(self.pixels())
+            .slice::<u8>(self.tiles())
+    }
+}
+
+/// Film and intervals of the points.
+struct Parts<'a> {
+    layout: Layout,
+    /// Place in the film of each replicate of each point.
+    places: &'a [u32],
+    state: RenderState<'a>,
+    /// Half-width of each pixel after the last step.
+    half_widths: &'a mut [f32],
+    /// 1 for each tile that has reached the error.
+    finished: &'a mut [u8],
+    /// Samples at which tiles are judged next.
+    decision: u32,
+    /// Error by which they were judged.
+    error: f64,
+}
+
+struct FeaturePoints<'a, F> {
+    method: IrradiancePoints<'a, F>,
+    parts: Parts<'a>,
+}
+
+impl<'a, F: Features> FeaturePoints<'a, F> {
+    fn new(
+        context: &RenderContext<'a>,
+        (points, settings): (&[IrradiancePoint], &PointSettings),
+        arena: &mut Arena<'a>,
+        executor: &mut impl Executor,
+    ) -> Result<Self, RenderError> {
+        let layout = Layout::of(points.len());
+        let state = RenderState::new(TILE, TILE * layout.tiles() as u32, settings.shard, arena)?;
+        let pixels = layout.pixels();
+        let (ordered, keys) = (arena.slice::<IrradiancePoint>(pixels)?, arena.slice::<u64>(pixels)?);
+        let (places, half_widths) = (arena.slice::<u32>(pixels)?, arena.slice::<f32>(pixels)?);
+        let finished = arena.slice::<u8>(layout.tiles())?;
+        order_along_curve(points, layout.replicates, keys);
+        for (place, key) in keys.iter().enumerate() {
+            if let Some(slot) = places.get_mut(number_of(*key)) {
+                *slot = place as u32;
+            }
+        }
+        let scene = context.scene_context::<F>();
+        let (keys, pieces) = (&*keys, ordered.chunks_mut(CHUNK));
+        let passed = executor.pass(pieces, |chunk, pieces, _| {
+            for (point, key) in pieces.iter_mut().zip(&keys[chunk * CHUNK..]) {
+                let number = number_of(*key);
+                let Some(given) = points.get(number / layout.replicates) else { continue };
+                *point = given.numbered(number as u32).settled(&scene);
+            }
+            Ok(Counters::default())
+        })?;
+        if !passed.is_complete {
+            // Without positions nothing can be sampled: the film stays empty.
+            ordered.fill(IrradiancePoint::default());
+        }
+        half_widths.fill(f32::INFINITY);
+        finished.fill(u8::from(!passed.is_complete));
+        let method = IrradiancePoints::new(context, ordered, settings.light);
+        Ok(Self {
+            method,
+            parts: Parts {
+                layout,
+                places,
+                state,
+                half_widths,
+                finished,
+                decision: FIRST_DECISION,
+                error: 0.0,
+            },
+        })
+    }
+
+    fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
+        match until {
+            Until::Samples(target) => self.sample(executor, target)?,
+            Until::Error(error) => self.sample_within((error, MOST_SAMPLES), executor)?,
+        }
+        self.estimate(executor)?;
+        Ok(())
+    }
+
+    /// Brings each tile to `target` samples.
+    fn sample<E: Executor>(&mut self, executor: &mut E, target: u32) -> Result<(), OutOfMemory> {
+        let round = &mut Round { executor, state: &mut self.parts.state, target, step: STEP };
+        self.method.round(round)
+    }
+
+    /// Adds samples to the tiles that have not reached `error`, until all have or have `most` samples. Tiles
+    /// are judged at numbers of samples of their own, so that the steps are of no matter.
+    fn sample_within<E: Executor>(
+        &mut self,
+        (error, most): (f64, u32),
+        executor: &mut E,
+    ) -> Result<(), OutOfMemory> {
+        self.parts.aim_at(error);
+        while !executor.is_over() && self.parts.has_open_tiles() {
+            let Parts { state, finished, decision, .. } = &mut self.parts;
+            let (finished, target, is_decision) = (&**finished, most.min(*decision), *decision <= most);
+            let is_finished = |tile: usize| finished.get(tile).is_none_or(|finished| *finished != 0);
+            let round = &mut Round { executor: &mut *executor, state, target, step: STEP };
+            self.method.sample_unfinished(round, is_finished)?;
+            if executor.is_over() || !is_decision {
+                return Ok(());
+            }
+            self.estimate(executor)?;
+            self.parts.finish_tiles(error as f32);
+            self.parts.decision = next_decision(target);
+        }
+        Ok(())
+    }
+
+    /// Half-widths of all points.
+    fn estimate(&mut self, executor: &mut impl Executor) -> Result<(), OutOfMemory> {
+        let (points, Parts { state, half_widths, layout, .. }) = (self.method.points(), &mut self.parts);
+        let pixels = state.film.pixels();
+        let total = layout.pixels();
+        let place = |i: usize| {
+            let point = points.get(i).copied().unwrap_or_default();
+            (Vec3::from(point.position), Vec3::from(point.normal))
+        };
+        let _ = executor.pass(half_widths.chunks_mut(POOLED_POINTS), |block, out, _| {
+            // The last block is a whole one as well.
+            let end = ((block + 1) * POOLED_POINTS).min(total);
+            let start = end.saturating_sub(POOLED_POINTS);
+            let mut variances = [f32::INFINITY; POOLED_POINTS];
+            point_variances(&pixels[start..end], |i| place(start + i), &mut variances);
+            let skipped = block * POOLED_POINTS - start;
+            for (half, variance) in out.iter_mut().zip(variances.iter().skip(skipped)) {
+                *half = half_width(*variance);
+            }
+            Ok(Counters::default())
+        })?;
+        Ok(())
+    }
+}
+
+/// Samples at which tiles are judged after `samples`.
+fn next_decision(samples: u32) -> u32 {
+    fmin(ceil(f64::from(samples) * sqrt(2.0)), f64::from(MOST_SAMPLES)) as u32
+}
+
+impl Parts<'_> {
+    /// Opens all tiles where `error` is another than before.
+    fn aim_at(&mut self, error: f64) {
+        if self.error != error {
+            self.finished.fill(0);
+            self.error = error;
+            let samples = self.state.samples.iter().copied().max().unwrap_or_default();
+            self.decision = FIRST_DECISION;
+            while self.decision < samples {
+                self.decision = next_decision(self.decision);
+            }
+        }
+    }
+
+    /// True if a tile of the shard has not reached the error.
+    fn has_open_tiles(&self) -> bool {
+        let shard = self.state.shard;
+        self.finished.iter().enumerate().any(|(tile, finished)| *finished == 0 && shard.owns(tile))
+    }
+
+    /// Marks the tiles in which enough points are within `error`.
+    fn finish_tiles(&mut self, error: f32) {
+        let pixels = &self.state.film.pixels()[..self.layout.pixels()];
+        let (sum, count) = pixels
+            .iter()
+            .filter(|pixel| pixel.count() > 0)
+            .fold((0.0, 0u64), |(sum, count), pixel| (sum + f64::from(luminance(pixel.mean())), count + 1));
+        let offset = OFFSET * (sum / count.max(1) as f64) as f32;
+        let tiles = pixels.chunks(PIXELS_PER_TILE).zip(self.half_widths.chunks(PIXELS_PER_TILE));
+        for ((pixels, half_widths), finished) in tiles.zip(self.finished.iter_mut()) {
+            // Replicates of a point average their noise.
+            let each = libm::sqrtf(self.layout.replicates as f32);
+            let is_within =
+                |(pixel, half): (&Pixel, &f32)| *half <= each * error * (luminance(pixel.mean()) + offset);
+            let within = pixels.iter().zip(half_widths).filter(|pair| is_within(*pair)).count();
+            *finished |= u8::from(within as f64 >= WITHIN * pixels.len() as f64);
+        }
+    }
+}
+
+/// Writes the places of all replicates of `points` along a Z-curve of position and octant of the normal:
+/// each key ends with the number of the replicate.
+fn order_along_curve(points: &[IrradiancePoint], replicates: usize, keys: &mut [u64]) {
+    let positions = || points.iter().map(|point| Vec3::from(point.position));
+    let lowest = positions().fold(Vec3::INFINITY, Vec3::min);
+    let size = (positions().fold(Vec3::NEG_INFINITY, Vec3::max) - lowest).max_element();
+    let scale = if size > 0.0 { 1023.0 / size } else { 0.0 };
+    for (number, key) in keys.iter_mut().enumerate() {
+        let Some(point) = points.get(number / replicates) else { continue };
+        let cell = ((Vec3::from(point.position) - lowest) * scale).to_array();
+        let curve = (0..3).fold(0, |curve, axis| curve | spread(cell[axis] as u32) << axis);
+        let octant = (0..3).fold(0, |octant, axis| octant | u64::from(point.normal[axis] < 0.0) << axis);
+        *key = (curve << 3 | octant) << NUMBER_BITS | number as u64;
+    }
+    keys.sort_unstable();
+}
+
+/// Bits of the number of a replicate in its key.
+const NUMBER_BITS: u32 = 31;
+
+fn number_of(key: u64) -> usize {
+    (key & ((1 << NUMBER_BITS) - 1)) as usize
+}
+
+/// The ten low bits of `x`, three apart.
+fn spread(x: u32) -> u64 {
+    (0..10).fold(0, |bits, bit| bits | u64::from(x >> bit & 1) << (3 * bit))
+}
+
+#[cfg(test)]
+mod tests;

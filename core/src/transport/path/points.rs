@@ -1,0 +1,269 @@
+//! Irradiance at points by path tracing: each path starts at a point as if at a white diffuse surface, which
+//! reflects irradiance / π.
+//!
+//! The plain algorithm is [`crate::transport::path::reference::irradiance`]; both compute the same bits at
+//! the baseline level. The first vertex is shaded alone; the paths behind it advance as those of pixels do.
+
+use super::PathIntegrator;
+use super::estimator::{LightEstimator, PathVertex, RemainingLight};
+use super::scalar::Path;
+use super::sharing::PathWave;
+use crate::Rgb;
+use crate::bsdf::{All, Bsdf, Diffuse, Features};
+use crate::bvh::Coherence;
+use crate::film::Pixel;
+use crate::geometry::{Frame, Hit, MISS, Ray};
+use crate::memory::{Arena, OutOfMemory};
+use crate::sampling::Sampler;
+use crate::scene::{Material, Scene, SurfacePoint};
+use crate::transport::settings::Counters;
+use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
+use crate::transport::walk::path_classes::PathClasses;
+use bytemuck::{Pod, Zeroable};
+use core::f32::consts::PI;
+use core::ops::Range;
+use glam::{Vec2, Vec3};
+
+/// The surface that stands for a point: π times its reflected radiance is the irradiance.
+const WHITE: Bsdf = Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE });
+static WHITE_MATERIAL: Material = Material::diffuse(Rgb::ONE);
+
+/// Distance within which a free point lies on a surface, in error bounds of both: the point was computed with
+/// rounding as well.
+const LIES_ON: f32 = 4.0;
+
+/// Bound of the rounding of a coordinate that a few operations have computed, relative to the coordinate.
+const POINT_ROUNDING: f32 = 16.0 * f32::EPSILON;
+
+/// Light of which the irradiance is estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightPart {
+    /// All light.
+    #[default]
+    All,
+    /// Light directly from emitters.
+    Direct,
+    /// Light that surfaces have scattered.
+    Indirect,
+}
+
+/// A point with a normal, at which irradiance is estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct IrradiancePoint {
+    /// Position in the scene.
+    pub position: [f32; 3],
+    /// Unit normal of the hemisphere.
+    pub normal: [f32; 3],
+    /// Unit normal of the surface; no light comes from below it.
+    pub geometric_normal: [f32; 3],
+    /// Triangle of the surface, or [`MISS`] where the point is free.
+    pub triangle: u32,
+    /// Bound of the distance to the surface, by which rays start above it.
+    pub error: f32,
+    /// Number of the random numbers of the point. Points of different numbers are independent.
+    pub number: u32,
+}
+
+impl IrradiancePoint {
+    /// A point in space. Its rays leave the very position; [`IrradiancePoint::settled`] puts it on a surface
+    /// that it lies on within rounding.
+    pub fn free(position: Vec3, normal: Vec3) -> Self {
+        let normal = normal.to_array();
+        Self {
+            position: position.to_array(),
+            normal,
+            geometric_normal: normal,
+            triangle: MISS,
+            ..Self::default()
+        }
+    }
+
+    /// The point of a triangle at the weights `u` and `v` of its second and third corner, on its front, where
+    /// the corners go counter-clockwise, or on its back. `None` without such a triangle or its area.
+    pub fn on_triangle(scene: &Scene, triangle: u32, [u, v]: [f32; 2], front: bool) -> Option<Self> {
+        let corners = scene.mesh.triangles.get(triangle as usize)?.vertices;
+        let corner = |i: usize| Some(Vec3::from(*scene.mesh.positions.get(corners[i] as usize)?));
+        let normal = (corner(1)? - corner(0)?).cross(corner(2)? - corner(0)?).try_normalize()?;
+        let direction = if front { -normal } else { normal };
+        let hit = Hit { triangle, u, v, t: 0.0 };
+        let point = SurfacePoint::at::<All>(scene, &Ray::new(Vec3::ZERO, direction), &hit)?;
+        Some(Self::of_surface(&point))
+    }
+
+    /// The point of a surface.
+    fn of_surface(point: &SurfacePoint) -> Self {
+        Self {
+            position: point.position.to_array(),
+            normal: point.frame.normal.to_array(),
+            geometric_normal: point.geometric_normal.to_array(),
+            triangle: point.triangle,
+            error: point.error,
+            number: 0,
+        }
+    }
+
+    /// The same with the random numbers of `number`.
+    pub fn numbered(self, number: u32) -> Self {
+        Self { number, ..self }
+    }
+
+    /// A free point that lies on a surface within rounding is put on it, on the side of its normal: sensors at
+    /// height 0 of a floor are above the floor. Other points stay.
+    pub fn settled<F: Features>(self, context: &SceneContext<F>) -> Self {
+        let (position, normal) = (Vec3::from(self.position), Vec3::from(self.normal));
+        if self.triangle != MISS {
+            return self;
+        }
+        let rounding = POINT_ROUNDING * position.abs().max_element();
+        // From above to below, since rays along the surface would not meet it.
+        let above = 0.5 * LIES_ON * LIES_ON * rounding;
+        let mut ray = Ray::segment(position + above * normal, -normal, 2.0 * above);
+        for _ in 0..MOST_COINCIDENT {
+            let hit = context.nearest(&ray);
+            if !hit.is_some() {
+                return self;
+            }
+            let Some(surface) = context.surface_at(&ray, &hit) else { return self };
+            if surface.position.distance(position) <= LIES_ON * (surface.error + rounding) {
+                let normal = normal.to_array();
+                return Self { normal, number: self.number, ..Self::of_surface(&surface) };
+            }
+            let below = hit.t * (1.0 + f32::EPSILON) + surface.error;
+            ray = Ray::segment(ray.at(below), -normal, (ray.t_max - below).max(0.0));
+        }
+        self
+    }
+
+    /// The white surface at the point.
+    pub fn surface<'a>(&self) -> SurfacePoint<'a> {
+        SurfacePoint {
+            position: self.position.into(),
+            error: self.error,
+            geometric_normal: self.geometric_normal.into(),
+            frame: Frame::from_normal(self.normal.into()),
+            uv: Vec2::ZERO,
+            front: true,
+            material: &WHITE_MATERIAL,
+            triangle: self.triangle,
+        }
+    }
+}
+
+/// Most surfaces within rounding of a point that are tried.
+const MOST_COINCIDENT: usize = 4;
+
+impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
+    /// Traces `samples` of each of `points` and adds their irradiance in W/m² to `out`, in the order of
+    /// `points`.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    pub fn sample_irradiance(
+        &self,
+        (points, part): (&[IrradiancePoint], LightPart),
+        samples: Range<u32>,
+        wave: usize,
+        scratch: &mut Arena,
+        out: &mut [Pixel],
+    ) -> Result<Counters, OutOfMemory> {
+        let mut arena = scratch.scratch();
+        let most = samples.len().saturating_mul(points.len());
+        let mut wave = PathWave::<E::State, ()>::new(wave.min(most), &mut arena)?;
+        let mut counters = Counters::default();
+        let each = |sample| points.iter().zip(0..).map(move |(point, place)| (point.number, place, sample));
+        let mut all = samples.flat_map(each).peekable();
+        while all.peek().is_some() {
+            let mut count = 0;
+            for (number, place, sample) in all.by_ref().take(wave.wave.paths.len()) {
+                wave.wave.paths[count].begin(number, place, sample, PathClasses::ALL);
+                wave.begin(count, 0);
+                count += 1;
+            }
+            counters.paths += count as u64;
+            self.leave_points((points, part), &mut wave, count, &mut counters);
+            for i in 0..count {
+                let path = wave.wave.paths[i];
+                if let Some(pixel) = out.get_mut(path.place as usize) {
+                    pixel.add(path.sample, wave.radiance(i) * PI, &mut counters.dropped);
+                }
+            }
+        }
+        Ok(counters)
+    }
+
+    /// Takes the light samples and the next directions at the points of the first `count` paths, and follows
+    /// the paths to their ends.
+    fn leave_points(
+        &self,
+        (points, part): (&[IrradiancePoint], LightPart),
+        wave: &mut PathWave<E::State, ()>,
+        count: usize,
+        counters: &mut Counters,
+    ) {
+        let most = (self.estimator.light_samples(&self.context) + self.estimator.connections()) as usize;
+        wave.wave.next = 0;
+        for i in 0..count {
+            if wave.wave.shadows.count + most > wave.wave.shadows.rays.len() {
+                wave.wave.trace_shadow_rays(&self.context, counters);
+            }
+            let Some(point) = points.get(wave.wave.paths[i].place as usize) else { continue };
+            self.leave_point((&point.surface(), part), wave, i, counters);
+        }
+        wave.wave.trace_shadow_rays(&self.context, counters);
+        let count = wave.wave.next;
+        wave.wave.trace(&self.context, count, Coherence::Incoherent, counters);
+        self.trace_to_end(wave, count, counters);
+    }
+
+    /// Light sample and next ray of path `i` at its point.
+    fn leave_point(
+        &self,
+        (point, part): (&SurfacePoint<'a>, LightPart),
+        PathWave { wave, memory }: &mut PathWave<E::State, ()>,
+        i: usize,
+        counters: &mut Counters,
+    ) {
+        if self.settings.max_depth < 2 {
+            return;
+        }
+        let mut none = (E::State::zeroed(), ());
+        let path = wave.paths[i];
+        let vertex = PathVertex {
+            path: i,
+            pixel: path.pixel,
+            sample: path.sample,
+            point,
+            bsdf: WHITE,
+            sampler: Sampler::new(self.settings.seed, path.pixel, path.sample),
+            first: dimension::vertex(1),
+            segments: 1,
+            wo: Vec3::Z,
+            normal: point.frame.normal,
+            distance: 0.0,
+            travelled: 0.0,
+            throughput: Rgb::ONE,
+            apart: false,
+            came: path.classes,
+            rest: path.classes,
+        };
+        let Some(Path { path, state, shared }) = memory.path(wave.paths, i, &mut none) else { return };
+        let rest = match part {
+            LightPart::All => self.known(Path { path, state, shared }, &vertex, E::Found::default()),
+            LightPart::Direct => RemainingLight::of(PathClasses::EMITTED),
+            LightPart::Indirect => {
+                RemainingLight { is_lit: true, ..RemainingLight::of(PathClasses::SCATTERED) }
+            }
+        };
+        let state = memory.states.get(i).unwrap_or(&none.0);
+        self.direct((state, &mut ()), &vertex, &rest, wave);
+        if rest.ends {
+            return;
+        }
+        let Some(path) = memory.path(wave.paths, i, &mut none) else { return };
+        if let Some(ray) = self.scatter(path, &vertex, &rest, counters) {
+            wave.push_ray(i, ray);
+        }
+    }
+}

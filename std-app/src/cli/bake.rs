@@ -1,0 +1,235 @@
+//! `halflight bake`: irradiance at points, each with its interval.
+
+use super::failure::Failure;
+use super::interrupt::{self, INTERRUPT};
+use super::outputs::{Outputs, Role};
+use super::picture_args::{note_darkness, render_failure};
+use super::progress::ProgressReporter;
+use super::{print_note, values};
+use clap::{Args, ValueEnum};
+use halflight::bake::{
+    self, BakeSettings, Baked, Quantity, Sensor, TableFormat, read_sensors, vertices, write_table,
+};
+use halflight::load::{self, LoadOptions, LoadedScene};
+use halflight::memory::Budget;
+use halflight::render::Stop;
+use halflight::report::file_name;
+use halflight::quantity::readable_seconds;
+use halflight::values::{Depth, Samples, TargetError};
+use halflight_core::{IrradiancePoint, LightPart};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Estimate irradiance at points, each with its 95 % interval
+///
+/// Points are the sensors of a grid, a line `x y z nx ny nz` each, or the vertices of the scene. A sensor that
+/// lies on a surface within rounding is put on it, on the side of its normal. The first of --spp, --time and
+/// --error that holds ends the work; without one it ends when the intervals are 2 %, or after 60 s.
+#[derive(Args)]
+pub(super) struct Bake {
+    /// Scene: a mesh (.obj) or a scene file (.toml)
+    scene: PathBuf,
+    /// Sensors, a line `x y z nx ny nz` each; `-` is standard input
+    #[arg(long, value_name = "FILE", required_unless_present = "vertices", conflicts_with = "vertices")]
+    points: Option<PathBuf>,
+    /// All vertices of the scene, on the front of their triangles
+    #[arg(long)]
+    vertices: bool,
+    /// Table: .csv, .res (R G B a line) or .ply; may be repeated [default: CSV on standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// Quantity of the values
+    #[arg(long, default_value = "irradiance")]
+    unit: Unit,
+    /// Light to estimate
+    #[arg(long, default_value = "all")]
+    light: Light,
+
+    /// Samples per point
+    #[arg(long, value_name = "N", value_parser = values::checked::<u32, Samples>)]
+    spp: Option<Samples>,
+    /// Time, as in 30s, 2m, 1h
+    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    time: Option<f64>,
+    /// End tiles of 256 near points one by one, when 95 % of their intervals are within this part of the
+    /// value and a tenth of the mean
+    #[arg(long, value_name = "RELATIVE", value_parser = values::checked::<f64, TargetError>)]
+    error: Option<TargetError>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
+    /// Most segments of a path; 2 is direct light
+    #[arg(long, value_name = "N", value_parser = values::checked::<u32, Depth>)]
+    max_depth: Option<Depth>,
+    /// Number of threads [default: all hardware threads]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Memory limit for files, scene and all structures, as in 512M or 2G [default: four fifths of the
+    /// machine's]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
+    memory: Option<usize>,
+    /// Print one JSON object instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Unit {
+    /// W/m²
+    Irradiance,
+    /// Radiance of a white diffuse surface: irradiance / π
+    White,
+    /// Illuminance by Radiance's weights
+    Lux,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Light {
+    /// All light
+    All,
+    /// Light directly from emitters
+    Direct,
+    /// Light that surfaces have scattered
+    Indirect,
+}
+
+impl Bake {
+    /// Number of threads; `None`: all of the machine.
+    pub(super) fn threads(&self) -> Option<usize> {
+        self.threads.map(|threads| threads as usize)
+    }
+
+    pub(super) fn run(&self) -> Result<ExitCode, Failure> {
+        let mut outputs = Outputs::new(self.json);
+        let tables = self.tables()?;
+        tables.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
+        outputs.protect(&self.scene)?;
+        let file = self.points.as_deref().filter(|file| *file != Path::new("-"));
+        file.map_or(Ok(()), |file| outputs.protect(file))?;
+        let mut budget = Budget::new(self.memory);
+        let given = self.points.as_deref().map(|file| read_sensors(file, budget.left())).transpose()?;
+        budget.take(given.as_ref().map_or(0, |sensors| size_of_val(&sensors[..])))?;
+        let options = LoadOptions { memory: Some(budget.left()), ..LoadOptions::default() };
+        let loaded = load::load(&self.scene, &options)?;
+        loaded.files.iter().try_for_each(|file| outputs.protect(file))?;
+        loaded.repairs.iter().for_each(print_note);
+        let (points, sensors) = match given {
+            Some(sensors) => (sensors.iter().map(|sensor| sensor.point(&loaded)).collect(), sensors),
+            None => vertices(&loaded),
+        };
+        let baked = self.bake(&loaded, &points)?;
+        for (path, format) in &tables {
+            outputs.save_table(path, |out| self.write(out, *format, &sensors, &baked));
+        }
+        if tables.is_empty() && !self.json {
+            let mut table = Vec::new();
+            self.write(&mut table, TableFormat::Csv, &sensors, &baked)?;
+            print_note(self.text(&baked));
+            let table = String::from_utf8_lossy(&table);
+            return Ok(outputs.end(table.trim_end(), code(&baked)));
+        }
+        let results = if self.json { self.object(&baked, &tables).to_string() } else { self.text(&baked) };
+        Ok(outputs.end(&results, code(&baked)))
+    }
+
+    /// Files and formats of the tables.
+    fn tables(&self) -> Result<Vec<(PathBuf, TableFormat)>, Failure> {
+        let format = |path: &PathBuf| match TableFormat::of(path) {
+            Some(format) => Ok((path.clone(), format)),
+            None => Err(Failure::new(format!("{}: a table is .csv, .res or .ply", path.display()))
+                .advice("choose a name with one of these endings")),
+        };
+        self.output.iter().map(format).collect()
+    }
+
+    fn bake(&self, loaded: &LoadedScene, points: &[IrradiancePoint]) -> Result<Baked, Failure> {
+        let views = loaded.views();
+        let scene = views.scene(loaded.camera_or_default());
+        let stop =
+            Stop { spp: self.spp.map(u32::from), seconds: self.time, error: self.error.map(f64::from) };
+        let stop = if stop == Stop::default() { BakeSettings::SENSIBLE } else { stop };
+        let stop = match note_darkness(&scene) {
+            true => Stop { spp: stop.spp.or(Some(4)), ..stop },
+            false => stop,
+        };
+        let settings = BakeSettings {
+            stop,
+            light: match self.light {
+                Light::All => LightPart::All,
+                Light::Direct => LightPart::Direct,
+                Light::Indirect => LightPart::Indirect,
+            },
+            seed: self.seed,
+            max_depth: self.max_depth.map(u32::from),
+            threads: self.threads(),
+            memory: self.memory,
+            ..BakeSettings::default()
+        };
+        interrupt::install_handler()?;
+        let mut reporter = ProgressReporter::new();
+        let mut progress = |progress: &bake::BakeProgress| {
+            let [tiles, finished] = progress.tiles;
+            let within = self.error.map_or(String::new(), |_| format!(", {finished} of {tiles} tiles"));
+            let seconds = readable_seconds(progress.seconds);
+            let text = format!("{} samples per point{within}, {seconds}", progress.samples);
+            reporter.report_text(&text, progress.seconds, progress.seconds_left);
+        };
+        let baked = bake::irradiance(&scene, points, &settings, &mut progress, &INTERRUPT);
+        reporter.end();
+        baked.map_err(|error| render_failure(&self.scene, &error))
+    }
+
+    fn write(
+        &self,
+        out: &mut dyn std::io::Write,
+        format: TableFormat,
+        sensors: &[Sensor],
+        baked: &Baked,
+    ) -> std::io::Result<()> {
+        let quantity = match self.unit {
+            Unit::Irradiance => Quantity::Irradiance,
+            Unit::White => Quantity::White,
+            Unit::Lux => Quantity::Lux,
+        };
+        write_table(out, (format, quantity), sensors, &baked.values)
+    }
+
+    fn object(&self, baked: &Baked, tables: &[(PathBuf, TableFormat)]) -> Value {
+        let [build, sampling] = baked.seconds;
+        let [tiles, finished] = baked.tiles;
+        let mut samples: Vec<u32> = baked.values.iter().map(|value| value.samples).collect();
+        samples.sort_unstable();
+        let at = |part: usize| samples.get((samples.len() - 1) * part / 2).copied();
+        json!({
+            "points": baked.values.len(),
+            "samples": { "least": at(0), "median": at(1), "most": at(2) },
+            "tiles": tiles,
+            "within_error": self.error.map(|_| finished),
+            "half_width": baked.median_half_width(),
+            "mean": baked.mean(),
+            "seconds": { "build": build, "sampling": sampling },
+            "rays": baked.counters.all_rays(),
+            "paths": baked.counters.paths,
+            "dropped": baked.counters.dropped.total(),
+            "interrupted": baked.is_interrupted,
+            "outputs": tables.iter().map(|(path, _)| file_name(path)).collect::<Value>(),
+        })
+    }
+
+    fn text(&self, baked: &Baked) -> String {
+        let [build, sampling] = baked.seconds.map(readable_seconds);
+        let half_width =
+            baked.median_half_width().map_or("unknown".into(), |half| format!("{:.2} %", 100.0 * half));
+        let fewest = baked.values.iter().map(|value| value.samples).min().unwrap_or_default();
+        format!(
+            "{} points, at least {fewest} samples each; median half-width of the intervals {half_width}; \
+             built in {build}, sampled in {sampling}",
+            baked.values.len(),
+        )
+    }
+}
+
+fn code(baked: &Baked) -> ExitCode {
+    if baked.is_interrupted { ExitCode::from(3) } else { ExitCode::SUCCESS }
+}

@@ -1,0 +1,109 @@
+//! Irradiance at points by the program and by the library.
+
+use crate::support::Folder;
+use core::sync::atomic::AtomicBool;
+use halflight::Renderer;
+use halflight::bake::{BakeSettings, Sensor, irradiance};
+use halflight::load::{LoadOptions, load};
+use halflight::render::Stop;
+use std::io::Write;
+use std::process::Stdio;
+
+/// Irradiance below the middle of the lamp: π times the form factor of a square of side 2 at distance 2.
+const BELOW_THE_LAMP: f64 = 0.752_25;
+
+/// Rows of a table, without its head.
+fn rows(table: &[u8]) -> Vec<Vec<f64>> {
+    let text = String::from_utf8(table.to_vec()).unwrap();
+    text.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect()
+}
+
+#[test]
+fn sensors_of_standard_input_give_a_table_on_standard_output() {
+    let folder = Folder::new("bake-stdin");
+    let mut command = folder.command("bake scene.obj --points - --spp 256");
+    let mut child =
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // On the floor, a rounding below it, and a desk that looks down.
+    let sensors = b"# grid\n0 0 0 0 1 0\n0 -1e-8 0 0 2 0\n0.1 0.5 0.1 0 -1 0\n";
+    child.stdin.take().unwrap().write_all(sensors).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let rows = rows(&output.stdout);
+    assert_eq!(rows.len(), 3);
+    for row in &rows[..2] {
+        let [value, lower, upper] = [row[9], row[10], row[11]];
+        assert!((value / BELOW_THE_LAMP - 1.0).abs() < 0.02 && lower <= value && value <= upper, "{row:?}");
+    }
+    assert!(rows[2][9] < 0.5 * BELOW_THE_LAMP && rows[2][9] > 0.0, "{:?}", rows[2]);
+}
+
+#[test]
+fn tables_have_the_bits_of_any_number_of_threads() {
+    let folder = Folder::new("bake-threads");
+    let grid: String =
+        (0..600).map(|i| format!("{} 0.0 {} 0 1 0\n", i % 25 * 2 / 25, i as f64 / 300.0 - 1.0)).collect();
+    std::fs::write(folder.path("grid.pts"), grid).unwrap();
+    let table = |threads: usize| {
+        let name = format!("{threads}.csv");
+        let object = folder.object(&format!(
+            "bake scene.obj --points grid.pts --error 0.1 --threads {threads} -o {name} --json"
+        ));
+        assert_eq!((&object["points"], &object["tiles"]), (&600.into(), &object["within_error"]));
+        std::fs::read(folder.path(&name)).unwrap()
+    };
+    assert_eq!(table(1), table(3));
+}
+
+#[test]
+fn vertices_and_formats_follow_from_flags() {
+    let folder = Folder::new("bake-formats");
+    let object = folder.object("bake scene.obj --vertices --spp 16 --unit lux -o a.res -o b.ply --json");
+    assert_eq!(object["points"], 8);
+    assert_eq!(std::fs::read_to_string(folder.path("a.res")).unwrap().lines().count(), 8);
+    assert!(std::fs::read(folder.path("b.ply")).unwrap().starts_with(b"ply\nformat binary_little_endian"));
+    let direct = folder.object("bake scene.obj --vertices --spp 16 --light direct -o a.csv --json");
+    let indirect = folder.object("bake scene.obj --vertices --spp 16 --light indirect -o b.csv --json");
+    assert!(direct["mean"][0].as_f64().unwrap() > 0.0);
+    // The lamp reflects nothing, and the floor is lit by it alone; the lamp sees the floor.
+    let at = |file: &str, row: usize| rows(&std::fs::read(folder.path(file)).unwrap())[row][9];
+    assert_eq!(at("b.csv", 0), 0.0);
+    assert!(at("b.csv", 4) > 0.0 && at("a.csv", 4) == 0.0);
+    drop(indirect);
+}
+
+#[test]
+fn bad_sensors_and_outputs_are_refused_before_the_work() {
+    let folder = Folder::new("bake-refused");
+    std::fs::write(folder.path("bad.pts"), "0 0 0 0 1 0\n0 0 0 0 1\n").unwrap();
+    std::fs::write(folder.path("grid.csv"), "0 0 0 0 1 0\n").unwrap();
+    for (arguments, message) in [
+        ("bake scene.obj --points bad.pts", "bad.pts: line 2: 5 numbers where six are expected"),
+        ("bake scene.obj --points none.pts", "none.pts"),
+        ("bake scene.obj", "--points"),
+        ("bake scene.obj --vertices -o table.txt", "a table is .csv, .res or .ply"),
+        ("bake scene.obj --points grid.csv -o grid.csv", "would overwrite the input"),
+        ("bake scene.obj --vertices --error 0", "--error"),
+        ("bake scene.obj --vertices --memory 1K", "memory"),
+    ] {
+        let said = folder.refused(arguments);
+        assert!(said.contains(message), "{arguments}: {said}");
+    }
+}
+
+#[test]
+fn the_owner_of_a_scene_bakes_what_a_build_of_its_own_does() {
+    let folder = Folder::new("bake-library");
+    let loaded = load(&folder.path("scene.obj"), &LoadOptions::default()).unwrap();
+    let sensor = Sensor { position: [0.2, 0.0, 0.1], normal: [0.0, 1.0, 0.0] };
+    let points = [sensor.point(&loaded)];
+    let stop = Stop { spp: Some(16), ..Stop::default() };
+    let settings = BakeSettings { stop, ..BakeSettings::default() };
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    let alone = irradiance(&scene, &points, &settings, &mut |_| {}, &AtomicBool::new(false)).unwrap();
+    let owned = Renderer::new(loaded.clone(), None).unwrap().irradiance(&points, &settings).unwrap();
+    assert_eq!(alone.values, owned.values);
+    // A single point has 64 replicates.
+    assert_eq!(alone.values[0].samples, 16 * 64);
+}
