@@ -34,6 +34,11 @@ pub(super) trait Coat {
     /// Least-squares fit to T.
     fn transmittance_fit(&self) -> SchlickFit<Rgb>;
 
+    /// Directional albedo at normal incidence, an estimate.
+    fn normal_albedo(&self) -> Rgb {
+        self.specular_albedo(1.0) + self.base() * self.transmittance(1.0) * self.mean_transmittance()
+    }
+
     /// Probability of the coat's lobe: its share of the energy that leaves towards `wo`, with the weight
     /// [`COAT_WEIGHT`] of the coat, and `base_weight` of the base.
     #[inline]

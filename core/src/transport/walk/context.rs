@@ -70,14 +70,14 @@ impl<'a, F: Features> SceneContext<'a, F> {
 
     /// Nearest hit of `ray`.
     #[inline]
-    pub(in crate::transport) fn nearest(&self, ray: &Ray) -> Hit {
+    pub(crate) fn nearest(&self, ray: &Ray) -> Hit {
         let hit = self.bvh.nearest(self.level, ray);
         if self.scene.mesh.overlaps.is_empty() { hit } else { self.scene.visible_hit(ray, hit) }
     }
 
     /// Nearest hits of `rays`.
     #[inline]
-    pub(in crate::transport) fn nearest_batch(&self, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
+    pub(crate) fn nearest_batch(&self, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         self.bvh.nearest_batch(self.level, rays, coherence, hits);
         if !self.scene.mesh.overlaps.is_empty() {
             rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.scene.visible_hit(ray, *hit));
@@ -86,13 +86,13 @@ impl<'a, F: Features> SceneContext<'a, F> {
 
     /// Surface point of `ray` at `hit`.
     #[inline]
-    pub(in crate::transport) fn surface_at(&self, ray: &Ray, hit: &Hit) -> Option<SurfacePoint<'a>> {
+    pub(crate) fn surface_at(&self, ray: &Ray, hit: &Hit) -> Option<SurfacePoint<'a>> {
         SurfacePoint::at::<F>(self.scene, ray, hit).filter(|_| hit.is_some())
     }
 
     /// BSDF at `point`.
     #[inline]
-    pub(in crate::transport) fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
+    pub(crate) fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
         Bsdf::at::<F>(self.scene, point.material, point.uv, point.front)
     }
 
@@ -107,7 +107,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// True if a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`
     /// (evaluated for cut-outs only), or the ray's own triangle, hit by rounding.
     #[inline]
-    pub(in crate::transport) fn is_skipped(
+    pub(crate) fn is_skipped(
         &self,
         point: &SurfacePoint,
         hit: &Hit,
