@@ -61,7 +61,7 @@ pub(super) struct Seen {
 
 impl Seen {
     /// Number of the cluster.
-    pub fn cluster(&self) -> u32 {
+    pub(super) fn cluster(&self) -> u32 {
         let ends = u64::from(self.end) << 32 | u64::from(self.mirrored);
         match (mix(ends ^ mix(u64::from(self.chain))) >> 32) as u32 {
             NO_CLUSTER => 0,
@@ -80,11 +80,11 @@ pub(super) struct Batch<'m> {
 }
 
 impl<'m> Batch<'m> {
-    pub fn footprint(rays: usize) -> Footprint {
+    pub(super) fn footprint(rays: usize) -> Footprint {
         Footprint::default().slice::<Ray>(rays).slice::<Hit>(rays).slice::<Seen>(rays).slice::<Ray>(rays)
     }
 
-    pub fn new(rays: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub(super) fn new(rays: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let batch = (arena.slice(rays)?, arena.slice(rays)?, arena.slice(rays)?, arena.slice(rays)?);
         let (rays, hits, seen, reflected) = batch;
         Ok(Self { rays, hits, seen, reflected })
@@ -115,14 +115,14 @@ pub(super) struct Chains<'a, F> {
 }
 
 impl<'a, F: Features> Chains<'a, F> {
-    pub fn new(context: SceneContext<'a, F>, components: SurfaceComponents<'a>) -> Self {
+    pub(super) fn new(context: SceneContext<'a, F>, components: SurfaceComponents<'a>) -> Self {
         let near = 1e-3 * context.bvh.bounds().diagonal();
         Self { context, components, near }
     }
 
     /// Follows the first `count` rays of the batch into `batch.seen`; `sampler` gives the random numbers of
     /// a ray. Albedo and normal are left out unless `with_surfaces`. Returns the number of traced rays.
-    pub fn trace(
+    pub(super) fn trace(
         &self,
         batch: &mut Batch,
         count: usize,
@@ -204,9 +204,7 @@ impl<'a, F: Features> Chains<'a, F> {
             return self.onward(hit, seen, point.spawn(ray.direction.into()));
         }
         let bsdf = self.context.bsdf_at(&point);
-        if !ends_here
-            && let Some(onward) = self.specular((ray, hit), (&point, &bsdf), seen, reflection)
-        {
+        if !ends_here && let Some(onward) = self.specular((ray, hit), (&point, &bsdf), seen, reflection) {
             return self.onward(hit, seen, onward);
         }
         let albedo = albedo(&point, &bsdf);

@@ -8,3 +8,6 @@ mod surfaces;
 pub use components::SurfaceComponents;
 pub use first_surfaces::FirstSurfaces;
 pub use surfaces::{NO_CLUSTER, PixelSurfaces};
+
+#[cfg(test)]
+mod tests;
