@@ -140,7 +140,8 @@ impl<'a, F: Features> Chains<'a, F> {
             if live == 0 {
                 break;
             }
-            let coherence = if segment == 0 { Coherence::Coherent } else { Coherence::Incoherent };
+            // Behind a plane mirror or a pane rays are still coherent.
+            let coherence = if segment < 2 { Coherence::Coherent } else { Coherence::Incoherent };
             self.context.nearest_batch(&rays[..live], coherence, &mut hits[..live]);
             traced += live as u64;
             let (mut next, mut mirrors) = (0, 0);

@@ -159,13 +159,18 @@ fn weld(mesh: &Mesh, extent: f32, table: &mut [u32], welded: &mut [u32]) {
     // Casts saturate, and NaN becomes zero.
     let cell = |vertex: u32| -> [u64; 3] {
         let position = mesh.positions.get(vertex as usize).copied().unwrap_or_default();
-        position.map(|x| libm::roundf(x * inverse) as i64 as u64)
+        position.map(|x| nearest(x * inverse) as u64)
     };
     table.fill(NONE);
     for (vertex, first) in (0..).zip(welded) {
         let here = cell(vertex);
         *first = find_or_insert(table, hash(here), vertex, |other| cell(other) == here);
     }
+}
+
+/// Nearest whole number; 0 for NaN.
+fn nearest(x: f32) -> i64 {
+    (x + 0.5f32.copysign(x)) as i64
 }
 
 fn hash(words: [u64; 3]) -> u64 {
@@ -301,7 +306,10 @@ fn plane(mesh: &Mesh, extent: f32, triangle: u32) -> Option<[u64; 3]> {
     // The same for both sides.
     let side = 1f32.copysign(normal.dot(Vec3::new(1.0, 1e-3, 1e-6)));
     let offset = side * normal.dot(mesh.corners(triangle)[0]);
-    let offset = if extent > 0.0 { libm::roundf(offset / (extent * PLANE)) as i64 } else { 0 };
-    let [x, y, z] = (side * normal).to_array().map(|x| libm::roundf(x / PLANE_NORMAL) as i32 as u32);
+    let offset = if extent > 0.0 { nearest(offset / (extent * PLANE)) } else { 0 };
+    let [x, y, z] = (side * normal).to_array().map(|x| nearest(x / PLANE_NORMAL) as u32);
     Some([u64::from(material) << 32 | u64::from(x), u64::from(y) << 32 | u64::from(z), offset as u64])
 }
+
+#[cfg(test)]
+mod tests;

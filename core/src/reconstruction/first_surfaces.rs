@@ -23,8 +23,8 @@ use halflight_simd::kernels::shade::numbers::SampleBlock;
 const RAYS: usize = 16;
 /// Largest and smallest number of rays of a pixel with an edge nearby.
 const EDGE_RAYS: [usize; 2] = [256, 64];
-/// Rays of edges per pixel of the picture. More pixels with edges have fewer rays each.
-const EDGE_BUDGET: usize = 48;
+/// Segments of rays of edges per pixel of the picture. More pixels with edges have fewer rays each.
+const EDGE_BUDGET: f64 = 48.0;
 /// Rays that are traced together.
 const BATCH: usize = 1024;
 /// Rows of a task.
@@ -101,7 +101,8 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
 
         let clusters = &*clusters;
         let edges = (0..self.pixels()).filter(|&i| self.is_at_edge(clusters, i)).count();
-        let rays = edge_rays(self.pixels(), edges);
+        let segments = passed.counters.rays as f64 / (RAYS * self.pixels()) as f64;
+        let rays = edge_rays(self.pixels() as f64, edges as f64 * segments);
         let bands = pixels.chunks_mut(band).zip(rims.chunks_mut(band));
         let passed = executor.pass(bands, |number, (pixels, rims), worker| {
             self.refine_band(number * band, (pixels, rims), clusters, rays, &mut worker.scratch)
@@ -249,11 +250,12 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 }
 
-/// Number of rays of each pixel at an edge.
-fn edge_rays(pixels: usize, edges: usize) -> usize {
+/// Number of rays of each pixel at an edge in a picture of so many `pixels`. A ray of each of these takes
+/// `segments` in all.
+fn edge_rays(pixels: f64, segments: f64) -> usize {
     let [most, least] = EDGE_RAYS;
     let mut rays = most;
-    while rays > least && rays.saturating_mul(edges) > pixels.saturating_mul(EDGE_BUDGET) {
+    while rays > least && rays as f64 * segments > pixels * EDGE_BUDGET {
         rays /= 2;
     }
     rays
