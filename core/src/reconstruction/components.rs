@@ -1,7 +1,7 @@
 //! Smooth components of the surfaces of a scene: triangles of one material that meet along an edge without a
 //! crease, or lie in one plane.
 //!
-//! 1. Vertices at one position, within a millionth of the scene, are welded.
+//! 1. Vertices at one position are welded.
 //! 2. Edges are sorted by their lower vertex (by counting), then by the upper. Triangles at one edge join if
 //!    they have the same material and their planes or their shading normals at both ends turn by less than
 //!    [`CREASE`].
@@ -18,9 +18,6 @@ use glam::Vec3;
 
 /// Cosine of 20°, the largest angle between neighbours of one component.
 const CREASE: f32 = 0.939_692_6;
-
-/// Distance within which vertices are welded, as a fraction of the scene's largest extent.
-const WELD: f32 = 1e-6;
 
 /// Distance within which planes are the same, as a fraction of the scene's largest extent, and difference of
 /// the coordinates of their unit normals.
@@ -67,7 +64,7 @@ impl<'m> SurfaceComponents<'m> {
         let components = arena.slice::<u32>(mesh.triangles.len())?;
         let mut forest = Forest::new(components);
         let extent = Bounds::around(mesh.positions.iter().map(|&p| p.into())).extent().max_element();
-        join_at_edges(mesh, extent, &mut forest, &mut arena.scratch())?;
+        join_at_edges(mesh, &mut forest, &mut arena.scratch())?;
         join_in_planes(mesh, extent, &mut forest, &mut arena.scratch())?;
         forest.flatten();
         Ok(Self { components })
@@ -154,17 +151,16 @@ fn find_or_insert(table: &mut [u32], hash: u64, entry: u32, is_same: impl Fn(u32
 }
 
 /// First vertex at the position of each.
-fn weld(mesh: &Mesh, extent: f32, table: &mut [u32], welded: &mut [u32]) {
-    let inverse = if extent > 0.0 { 1.0 / (extent * WELD) } else { 0.0 };
-    // Casts saturate, and NaN becomes zero.
-    let cell = |vertex: u32| -> [u64; 3] {
+fn weld(mesh: &Mesh, table: &mut [u32], welded: &mut [u32]) {
+    let bits = |vertex: u32| -> [u64; 3] {
         let position = mesh.positions.get(vertex as usize).copied().unwrap_or_default();
-        position.map(|x| nearest(x * inverse) as u64)
+        // Both zeros are one position.
+        position.map(|x| u64::from((x + 0.0).to_bits()))
     };
     table.fill(NONE);
     for (vertex, first) in (0..).zip(welded) {
-        let here = cell(vertex);
-        *first = find_or_insert(table, hash(here), vertex, |other| cell(other) == here);
+        let here = bits(vertex);
+        *first = find_or_insert(table, hash(here), vertex, |other| bits(other) == here);
     }
 }
 
@@ -185,15 +181,10 @@ fn side<'m>(mesh: &Mesh<'m>, edge: u32) -> Option<(u32, &'m Triangle, [usize; 2]
 }
 
 /// Joins triangles that share an edge.
-fn join_at_edges(
-    mesh: &Mesh,
-    extent: f32,
-    forest: &mut Forest,
-    arena: &mut Arena,
-) -> Result<(), OutOfMemory> {
+fn join_at_edges(mesh: &Mesh, forest: &mut Forest, arena: &mut Arena) -> Result<(), OutOfMemory> {
     let vertices = mesh.positions.len();
     let welded = arena.slice::<u32>(vertices)?;
-    weld(mesh, extent, arena.scratch().slice::<u32>(slots(vertices))?, welded);
+    weld(mesh, arena.scratch().slice::<u32>(slots(vertices))?, welded);
     let ends = arena.slice::<u32>(vertices.saturating_add(1))?;
     let edges = arena.slice::<u32>(mesh.triangles.len().saturating_mul(3))?;
     // Lower and upper vertex of an edge.

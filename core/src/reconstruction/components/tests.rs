@@ -20,11 +20,9 @@ fn prism(sides: u32) -> (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<Triangle>) {
     for side in 0..sides {
         let first = positions.len() as u32;
         for (step, z) in [(0, 0.0), (1, 0.0), (1, 1.0), (0, 1.0)] {
-            let angle = (side + step) as f32 / sides as f32 * core::f32::consts::TAU;
+            let angle = ((side + step) % sides) as f32 / sides as f32 * core::f32::consts::TAU;
             let normal = Vec3::new(libm::cosf(angle), libm::sinf(angle), 0.0);
-            // Rounding makes the corners of neighbours differ.
-            let jitter = 1.0 + 1e-7 * (side % 3) as f32;
-            positions.push((jitter * normal + z * Vec3::Z).to_array());
+            positions.push((normal + z * Vec3::Z).to_array());
             normals.push(normal.to_array());
         }
         for vertices in [[0, 1, 2], [0, 2, 3]] {
