@@ -11,6 +11,7 @@ use super::chains::{Batch, Chains, Seen};
 use super::components::SurfaceComponents;
 use super::surfaces::{NO_CLUSTER, PixelSurfaces, SLOTS};
 use crate::bsdf::Features;
+use crate::geometry::Ray;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::method::{Executor, RenderContext};
 use crate::sampling::Sampler;
@@ -217,17 +218,17 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 
     /// Camera rays with these pixels and sample indices.
-    fn aim(&self, rays: &mut [crate::geometry::Ray], number: impl Fn(usize) -> (u32, u32)) {
+    fn aim(&self, rays: &mut [Ray], number: impl Fn(usize) -> (u32, u32)) {
         const BLOCK: usize = 16;
         let ([width, height], level) = (self.size, self.chains.context.level);
         let mut samples = SampleBlock::EMPTY;
         let mut raster = [[0.0; BLOCK]; 2];
         let mut aimed = [[0.0; 8]; BLOCK];
         for (block, rays) in rays.chunks_mut(BLOCK).enumerate() {
-            for i in 0..BLOCK {
+            let numbers = samples.place.iter_mut().zip(&mut samples.index);
+            for (i, (place, sample)) in numbers.enumerate() {
                 let (pixel, index) = number(block * BLOCK + i.min(rays.len() - 1));
-                samples.place[i] = Sampler::replicate_place(self.seed, pixel, 0);
-                samples.index[i] = index;
+                (*place, *sample) = (Sampler::replicate_place(self.seed, pixel, 0), index);
                 (raster[0][i], raster[1][i]) = ((pixel % width) as f32, (pixel / width) as f32);
             }
             let offsets = samples.pairs(level, PIXEL);
