@@ -23,3 +23,37 @@ pub struct PixelSurfaces {
     /// Distance along the ray to the first surface; 0 where the ray escapes.
     pub depth: f32,
 }
+
+impl Default for PixelSurfaces {
+    /// A whole pixel of one diffuse surface.
+    fn default() -> Self {
+        Self {
+            clusters: [0, NO_CLUSTER, NO_CLUSTER, NO_CLUSTER],
+            fractions: [1.0, 0.0, 0.0, 0.0],
+            albedo: [1.0; 3],
+            normal: [0.0, 0.0, 1.0],
+            depth: 1.0,
+        }
+    }
+}
+
+impl PixelSurfaces {
+    /// True if all rays of the pixel see one cluster.
+    #[inline]
+    pub fn is_whole(&self) -> bool {
+        self.fractions[0] >= 1.0
+    }
+
+    /// The cluster of a whole pixel, else [`NO_CLUSTER`].
+    #[inline]
+    pub fn whole(&self) -> u32 {
+        if self.is_whole() { self.clusters[0] } else { NO_CLUSTER }
+    }
+
+    /// Clusters with a fraction, and their fractions.
+    #[inline]
+    pub fn parts(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
+        let parts = self.clusters.iter().copied().zip(self.fractions);
+        parts.filter(|(cluster, fraction)| *cluster != NO_CLUSTER && *fraction > 0.0)
+    }
+}

@@ -19,7 +19,7 @@ use std::vec::Vec;
 const SIDE: u32 = 40;
 
 /// Threads of a test, which take the tasks in turn.
-struct Threads(usize);
+pub(super) struct Threads(pub(super) usize);
 
 impl Executor for Threads {
     type Fork = Serial;
