@@ -23,6 +23,7 @@ mod memory;
 mod merge;
 mod method;
 mod picture;
+mod reconstruction;
 mod rejected_tiles;
 mod rewritten_file;
 mod run;
@@ -41,7 +42,7 @@ pub use halflight_core::method::bidirectional::BidirectionalSettings;
 pub use halflight_core::method::counts::Choice;
 pub use halflight_core::method::instant_radiosity::VirtualLightSettings;
 pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
-pub use halflight_core::renderer::{Stop, StopRule};
+pub use halflight_core::renderer::{Reconstruct, Stop, StopRule};
 pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
@@ -108,6 +109,8 @@ pub struct Settings {
     /// Share of the work that goes into the audit, from 0 (no audit) to 1. `None`: 0.05 if the method is
     /// biased.
     pub audit: Option<f64>,
+    /// Reconstruction of the picture from the halves of its film. The film file keeps the samples.
+    pub reconstruct: Reconstruct,
     /// Part of the picture to render.
     pub shard: Shard,
     /// Film file to write during the render.
@@ -164,6 +167,7 @@ impl Default for Settings {
             stop: Stop::default(),
             reference: None,
             audit: None,
+            reconstruct: Reconstruct::Off,
             shard: Shard::WHOLE,
             checkpoint: None,
             resume: None,

@@ -12,7 +12,7 @@ use super::picture::{self, Picture};
 use super::threads::{Pool, Workers};
 use super::{
     Ending, MOST_PIXELS, Progress, RenderError, RenderResult, Seconds, Settings, cache_file,
-    environment_visibility, gaps,
+    environment_visibility, gaps, reconstruction,
 };
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
@@ -148,6 +148,7 @@ impl WithFeatures for Render<'_> {
         let mut may_fall_back = is_open;
         loop {
             let mut own = memory.within();
+            let reconstruction = reconstruction::set_up::<F>(&setup, &mut own)?;
             let ready = match method::set_up::<F>(plan, &setup, &mut own) {
                 Ok(Attempt::Instead(better)) => {
                     plan = *better;
@@ -177,6 +178,7 @@ impl WithFeatures for Render<'_> {
                 setup,
                 state: RenderState::new(width, height, settings.shard, &mut Arena::over(&mut film_lines))?,
                 audit,
+                reconstruction,
                 hidden,
                 memory: &mut own,
                 identity: request.identity(method),
