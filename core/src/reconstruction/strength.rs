@@ -61,11 +61,11 @@ pub(super) const fn cells(size: usize) -> usize {
     size.div_ceil(CELL)
 }
 
-/// Sums by tents of half width `radii`, in pixels, for whole pixels and mixed ones; then the strengths.
-/// `rows` is working memory.
+/// Sums by tents of half width `radii`, in pixels, for whole pixels and mixed ones; then the strengths. The
+/// coarser picture wins within `doubt` standard errors. `rows` is working memory.
 pub(super) fn strengths(
     [across, down]: [usize; 2],
-    radii: [f32; 2],
+    (radii, doubt): ([f32; 2], f64),
     (sums, rows): (&[CellSums], &mut [CellSums]),
     strengths: &mut [CellStrengths],
     executor: &mut impl Executor,
@@ -98,14 +98,14 @@ pub(super) fn strengths(
         for (x, out) in out.iter_mut().enumerate() {
             let sums = along(y, down, &|other, kind| rows[other * across + x][kind]);
             // The group of the pixels that have these strengths is the other one.
-            *out = core::array::from_fn(|kind| strength(sums[kind ^ 1]));
+            *out = core::array::from_fn(|kind| strength(sums[kind ^ 1], doubt));
         }
     });
 }
 
-/// The coarser picture wins within one standard error.
-fn strength([linear, square, variance]: [f64; 3]) -> f32 {
-    let linear = linear - libm::sqrt(variance.max(0.0));
+/// Minimum of the squared error, or of that less so many standard errors of its linear coefficient.
+fn strength([linear, square, variance]: [f64; 3], doubt: f64) -> f32 {
+    let linear = linear - doubt * libm::sqrt(variance.max(0.0));
     if square > LEAST_SQUARE { (-linear / (2.0 * square)).clamp(0.0, 1.0) as f32 } else { 1.0 }
 }
 

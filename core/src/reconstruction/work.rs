@@ -35,6 +35,10 @@ const BY_FITS: usize = 2;
 /// Half widths in pixels of the sums for strengths of whole pixels and mixed ones, by step.
 const RADII: [[f32; 2]; STEPS] = [[24.0, 43.0], [15.0, 22.0], [11.0, 22.0], [8.0, 16.0], [28.0, 56.0]];
 
+/// Standard errors within which the coarser picture wins: none in the last step, where few highlights that
+/// were spread have large ones.
+const DOUBTS: [f64; STEPS] = [1.0, 1.0, 1.0, 1.0, 0.0];
+
 /// Fractions of a picture by origin: the scales from the largest, and single pixels.
 pub const FRACTIONS: usize = STEPS;
 
@@ -290,7 +294,7 @@ impl<'m> Reconstruction<'m> {
         });
         let of_step = grid[0] * grid[1];
         let of_step = &mut all[step * of_step..][..of_step];
-        strengths(grid, RADII[step], (sums, rows), of_step, executor);
+        strengths(grid, (RADII[step], DOUBTS[step]), (sums, rows), of_step, executor);
         let (fine, of_step) = (&*fine, &*of_step);
         for_pieces(executor, picture, width, |y, row| {
             for (x, out) in row.iter_mut().enumerate() {
