@@ -15,10 +15,13 @@ use halflight_core::light::LightSampler;
 use halflight_core::memory::Arena;
 use halflight_core::method::path::PathTracing;
 use halflight_core::method::{PilotSize, RenderContext, RenderMethod, RenderState, Round, Shard};
-use halflight_core::reconstruction::{FirstSurfaces, NO_CLUSTER, PixelSurfaces, SurfaceComponents};
+use halflight_core::reconstruction::{
+    FRACTIONS, FilmReconstruction, FirstSurfaces, NO_CLUSTER, NotReconstructed, PixelSurfaces,
+    SurfaceComponents,
+};
 use halflight_core::transport::{PathSettings, UNLIMITED};
 use halflight_core::{Level, Rgb};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -88,6 +91,34 @@ impl Reference {
         [own, difference.relmse - own]
     }
 
+    /// Estimated squared error of the reconstructed picture with the denominators of the reference.
+    fn estimated(&self, film: &Film, filter: &FilmReconstruction) -> f64 {
+        let mean = self.picture.iter().map(|rgb| f64::from(rgb.element_sum())).sum::<f64>();
+        let floor = 0.01 * (mean / (3 * self.picture.len()) as f64).powi(2);
+        let places = (0..film.height()).flat_map(|y| (0..film.width()).map(move |x| [x, y]));
+        let squares = places.zip(&self.picture).map(|([x, y], reference)| {
+            let Some([a, b, _]) = filter.pixel([x, y]) else { return 0.0 };
+            let raw = film.pixel(x, y);
+            let bias = (a - raw.even.mean()) * (b - raw.odd.mean());
+            let square = 0.25 * (a - b) * (a - b) + bias;
+            let channels = square.to_array().into_iter().zip(reference.to_array());
+            channels.map(|(e, r)| f64::from(e) / (f64::from(r).powi(2) + floor)).sum::<f64>()
+        });
+        squares.sum::<f64>() / (3 * self.picture.len()) as f64
+    }
+
+    /// Sum of the squares of relative errors of pixels that are not whole, over all pixels, beyond the noise
+    /// of the reference.
+    fn error_of_mixed(&self, picture: &[Rgb], surfaces: &[PixelSurfaces]) -> f64 {
+        let only_mixed: Vec<Rgb> = (picture.iter().zip(&self.picture).zip(surfaces))
+            .map(|((own, reference), surfaces)| if surfaces.fractions[0] < 1.0 { *own } else { *reference })
+            .collect();
+        let variance = self.variance.iter().zip(surfaces);
+        let variance = variance.map(|(v, s)| if s.fractions[0] < 1.0 { *v } else { Rgb::ZERO }).collect();
+        let [_, error] = Self { picture: self.picture.clone(), variance }.errors(&only_mixed);
+        error
+    }
+
     fn write(&self, path: &PathBuf) -> Result<()> {
         let numbers = self.picture.iter().chain(&self.variance).flat_map(|rgb| rgb.to_array());
         let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
@@ -155,13 +186,15 @@ impl Reconstruction {
             spp => Some(self.reference(&context, spp, &mut executor)?),
         };
         let mut pictures = Vec::new();
+        output.line(HEAD);
         for seed in self.seed..self.seed + self.seeds.max(1) {
-            let context = RenderContext { settings: PathSettings { seed, ..settings }, ..context };
             let Some(reference) = &reference else { break };
-            let raw = film(&context, self.spp, &mut executor, |film| film.rows().collect::<Vec<_>>())?;
-            let [own, error] = reference.errors(&raw);
-            output.line(format!("seed {seed}: raw {error:.3e}, reference {own:.1e}"));
-            pictures.push(json!({ "seed": seed, "raw": error, "reference": own }));
+            let context = RenderContext { settings: PathSettings { seed, ..settings }, ..context };
+            let row = film(&context, self.spp, &mut executor, |film, executor| {
+                errors(film, seed, (surfaces, reference), executor)
+            })??;
+            output.line(row.line());
+            pictures.push(row.object());
         }
         output.object(&json!({
             "component_seconds": component_seconds,
@@ -177,7 +210,8 @@ impl Reconstruction {
             return Ok(known);
         }
         let settings = PathSettings { seed: REFERENCE_SEED, ..context.settings };
-        let reference = film(&RenderContext { settings, ..*context }, spp, executor, Reference::of)?;
+        let reference =
+            film(&RenderContext { settings, ..*context }, spp, executor, |film, _| Reference::of(film))?;
         if let Some(path) = &self.reference {
             reference.write(path)?;
         }
@@ -185,19 +219,110 @@ impl Reconstruction {
     }
 }
 
+/// Errors of the picture of a film, raw and reconstructed.
+fn errors(
+    film: &Film,
+    seed: u32,
+    (surfaces, reference): (&[PixelSurfaces], &Reference),
+    executor: &mut Threads,
+) -> Result<Row> {
+    let size = [film.width(), film.height()];
+    let start = Instant::now();
+    let mut memory = Pages::new(FilmReconstruction::footprint(size))?;
+    let mut filter = FilmReconstruction::new(size, surfaces, &mut Arena::over(&mut memory))?;
+    // Also where it makes the error larger.
+    filter.update(film, None, executor);
+    let found = filter.result().map_err(NotReconstructed::reason)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let raw: Vec<Rgb> = film.rows().collect();
+    let filtered: Vec<Rgb> = filter.picture().into_iter().flatten().collect();
+    let [own, raw] = reference.errors(&raw);
+    let [_, error] = reference.errors(&filtered);
+    let mixed = [film.rows().collect(), filtered].map(|picture| reference.error_of_mixed(&picture, surfaces));
+    let estimated = [found.error.raw, found.error.total.relmse];
+    let exact = reference.estimated(film, &filter);
+    let interval = [found.error.total.lower, found.error.total.upper];
+    Ok(Row {
+        seed,
+        own,
+        errors: [raw, error],
+        mixed,
+        estimated,
+        exact,
+        interval,
+        fractions: found.fractions,
+        seconds,
+    })
+}
+
 /// Calls `work` with a film of `spp` samples per pixel by path tracing.
 fn film<T>(
     context: &RenderContext,
     spp: u32,
     executor: &mut Threads,
-    work: impl FnOnce(&Film) -> T,
+    work: impl FnOnce(&Film, &mut Threads) -> T,
 ) -> Result<T> {
     let PathSettings { width, height, .. } = context.settings;
     let mut method = PathTracing::<All>::new(context, None, executor)?;
     let mut memory = Pages::new(RenderState::footprint(width, height))?;
     let mut state = RenderState::new(width, height, Shard::WHOLE, &mut Arena::over(&mut memory))?;
     method.round(&mut Round { executor, state: &mut state, target: spp, step: 64 })?;
-    Ok(work(&state.film))
+    Ok(work(&state.film, executor))
+}
+
+const HEAD: &str = "seed        raw  reconstructed  gain  told/true raw  told/true  same, true denominators  interval              \
+                    reference  mixed raw, reconstructed  seconds  fractions of 48, 24, 12, 6, 1 pixels";
+
+/// Errors of a picture.
+struct Row {
+    seed: u32,
+    /// Error of the reference.
+    own: f64,
+    /// relMSE of the raw and of the reconstructed picture.
+    errors: [f64; 2],
+    /// Parts of them that mixed pixels have.
+    mixed: [f64; 2],
+    estimated: [f64; 2],
+    /// Estimate with the denominators of the reference.
+    exact: f64,
+    interval: [f64; 2],
+    fractions: [f64; FRACTIONS],
+    seconds: f64,
+}
+
+impl Row {
+    fn line(&self) -> String {
+        let Self { seed, own, errors: [raw, error], mixed, estimated, exact, interval, fractions, seconds } =
+            self;
+        format!(
+            "{seed:4}  {raw:9.2e}  {error:13.2e}  {:4.1}  {:13.2}  {:9.2}  {:23.2}  {:.2e} to {:.2e}  {own:9.1e}  {:9.2} {:12.2}  \
+             {seconds:7.3}  {fractions:.2?}",
+            raw / error,
+            estimated[0] / raw,
+            estimated[1] / error,
+            exact / error,
+            interval[0],
+            interval[1],
+            mixed[0] / raw,
+            mixed[1] / error,
+        )
+    }
+
+    fn object(&self) -> Value {
+        json!({
+            "seed": self.seed,
+            "raw": self.errors[0],
+            "reconstructed": self.errors[1],
+            "mixed": self.mixed,
+            "estimated_raw": self.estimated[0],
+            "estimated": self.estimated[1],
+            "exact": self.exact,
+            "interval": self.interval,
+            "reference": self.own,
+            "fractions": self.fractions,
+            "seconds": self.seconds,
+        })
+    }
 }
 
 /// Numbers of pixels and clusters.
