@@ -173,7 +173,7 @@ fn hash(words: [u64; 3]) -> u64 {
     words.into_iter().fold(0, |sum, word| mix(sum.rotate_left(21) ^ word.wrapping_add(0x9e37_79b9_7f4a_7c15)))
 }
 
-/// Side `edge` of a mesh, three for each triangle: its triangle, and the places of its ends among the corners.
+/// Side `edge` of a mesh, three for each triangle: its triangle, and the numbers of its corners.
 fn side<'m>(mesh: &Mesh<'m>, edge: u32) -> Option<(u32, &'m Triangle, [usize; 2])> {
     let triangle = mesh.triangles.get((edge / 3) as usize)?;
     let first = (edge % 3) as usize;
