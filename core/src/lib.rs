@@ -100,6 +100,8 @@ pub mod method;
 #[doc(hidden)]
 pub mod photon;
 #[doc(hidden)]
+pub mod reconstruction;
+#[doc(hidden)]
 pub mod sampling;
 #[doc(hidden)]
 pub mod transport;

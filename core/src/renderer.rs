@@ -4,10 +4,12 @@ mod audited;
 mod error;
 mod of_features;
 mod points;
+mod reconstructing;
 mod rounds;
 mod settings;
 
 pub use crate::audit::{AuditWork, Audited, ErrorReport, NoiseAndBlur, Region};
+pub use crate::reconstruction::ReconstructionError;
 #[doc(hidden)]
 pub use audited::OutOfReach;
 pub use error::RenderError;
@@ -15,7 +17,7 @@ pub use of_features::FeatureRenderer;
 pub use points::{IrradianceRenderer, PointIrradiance, PointSettings};
 #[doc(hidden)]
 pub use rounds::{Estimates, Plan, Rounds, Stop, StopRule};
-pub use settings::{RequiredMemory, Settings, Until};
+pub use settings::{Reconstruct, RequiredMemory, Settings, Until};
 
 use crate::Rgb;
 use crate::bsdf::{All, DiffuseTextured, Opaque};
@@ -112,9 +114,16 @@ impl<'a> Renderer<'a> {
         of_build!(&self.build, renderer => renderer.error_report())
     }
 
-    /// Mean radiance of each pixel, row by row from the top.
+    /// Mean radiance of each pixel, row by row from the top: that of the samples, or the reconstructed one
+    /// where [`Settings::reconstruct`] wants it.
     pub fn picture(&self) -> impl Iterator<Item = Rgb> + '_ {
-        self.film().rows()
+        let film = self.film();
+        let made = of_build!(&self.build, renderer => renderer.reconstruction());
+        let light = move |x, y| match made.and_then(|made| made.pixel([x, y])) {
+            Some([_, _, light]) => light,
+            None => film.mean(x, y),
+        };
+        (0..film.height()).flat_map(move |y| (0..film.width()).map(move |x| light(x, y)))
     }
 
     /// Sums of the samples, with their halves.

@@ -236,7 +236,13 @@ fn irradiance_at_points_is_the_textbook_to_the_bit_for_any_wave() {
                 let mut scratch_memory = TestArena::new(PathIntegrator::<All>::scratch(wave));
                 let mut film = vec![Pixel::default(); points.len()];
                 tracer
-                    .sample_irradiance(&points, 0..3, wave, &mut scratch_memory.arena(), &mut film)
+                    .sample_irradiance(
+                        (&points, LightPart::All),
+                        0..3,
+                        wave,
+                        &mut scratch_memory.arena(),
+                        &mut film,
+                    )
                     .unwrap();
                 for (point, pixel) in points.iter().zip(&film) {
                     let mut expected = Pixel::default();

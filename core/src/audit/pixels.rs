@@ -9,6 +9,7 @@ use crate::estimate::{ErrorEstimate, PixelBias, filtered_pixel};
 use crate::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::method::{Executor, Shard};
+use crate::reconstruction::FilmReconstruction;
 use bytemuck::{Pod, Zeroable};
 
 /// State of an audit, for files and for merging.
@@ -107,12 +108,22 @@ impl<'m> AuditedPixels<'m> {
         self.findings.fill(NO_FINDING);
     }
 
-    /// Compares all pixels with `film`, whose mean is `mean`.
-    pub fn compare(&mut self, film: &Film, mean: f64, executor: &mut impl Executor) {
+    /// Compares all pixels with `film`, whose mean is `mean`, or with its `reconstruction`.
+    pub fn compare(
+        &mut self,
+        film: &Film,
+        reconstruction: Option<&FilmReconstruction>,
+        mean: f64,
+        executor: &mut impl Executor,
+    ) {
         let Self { count, pixels, truth, findings, .. } = self;
         let finding = |i: usize| {
             let (tile, own, number) = tile_of(film, pixels[i])?;
-            PixelBias::of(own.get(number)?, &truth[i], filtered_pixel(tile, own, mean, number), mean)
+            let filtered = filtered_pixel(tile, own, mean, number);
+            match reconstruction.and_then(|made| made.pixel(pixels[i])) {
+                Some(halves) => PixelBias::of_halves(halves, &truth[i], filtered, mean),
+                None => PixelBias::of(own.get(number)?, &truth[i], filtered, mean),
+            }
         };
         fill(executor, &mut findings[..*count], |i| finding(i).unwrap_or(NO_FINDING));
     }
@@ -302,7 +313,7 @@ mod tests {
             let own = state.pixels.iter().zip(state.truth);
             assert!(own.into_iter().all(|(pixel, truth)| darker(film, *pixel) == *truth));
             // An excess of a quarter, and less of dark pixels.
-            merged.compare(film, 12.0, &mut crate::method::Loop::new(&mut []));
+            merged.compare(film, None, 12.0, &mut crate::method::Loop::new(&mut []));
             let noise = ErrorEstimate { relmse: 0.01, lower: 0.01, upper: 0.01 };
             let audited = merged.verdict(noise).unwrap();
             assert!(audited.pixels as usize == count && audited.is_biased(), "{audited:?}");

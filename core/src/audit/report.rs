@@ -7,6 +7,7 @@ use crate::estimate::{BiasEstimate, ErrorEstimate};
 use crate::film::Film;
 use crate::method::hidden_light::{HiddenLight, LackingLight};
 use crate::method::{Executor, RenderState};
+use crate::reconstruction::{FilmReconstruction, ReconstructionError};
 
 /// Error of a picture in its parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,46 +20,51 @@ pub struct ErrorReport {
     pub noise_and_blur: Option<NoiseAndBlur>,
     /// Light that the method cannot find.
     pub lacking: Option<LackingLight>,
+    /// Error of the reconstructed picture without the bias of the method, if it is reconstructed. The parts
+    /// with bias are then those of the reconstructed picture; `noise` is that of the samples.
+    pub reconstructed: Option<ReconstructionError>,
 }
 
 impl ErrorReport {
-    /// Report of a picture, with the result of its `audit` if it has one.
+    /// Report of a picture, or of its `reconstruction`, with the result of its `audit` if it has one.
     pub fn new<F: Features, E: Executor>(
         state: &RenderState,
+        reconstruction: Option<&FilmReconstruction>,
         audit: Option<&mut Audit<F>>,
         executor: &mut E,
     ) -> Self {
         let film = &state.film;
         Self::of_film(
             film,
-            state.is_correlated,
+            (state.is_correlated, reconstruction.and_then(FilmReconstruction::error)),
             |mean, noise, executor| {
                 let audit = audit?;
-                audit.compare(film, mean, executor);
+                audit.compare(film, reconstruction, mean, executor);
                 audit.verdict(noise)
             },
             executor,
         )
     }
 
-    /// Report of `film`, whose errors are correlated between distant pixels or not. `audit` judges it by its
-    /// mean and its noise.
+    /// Report of `film`, whose errors are correlated between distant pixels or not, or of its reconstruction
+    /// with this error. `audit` judges it by its mean and its noise.
     pub fn of_film<E: Executor>(
         film: &Film,
-        is_correlated: bool,
+        (is_correlated, reconstructed): (bool, Option<ReconstructionError>),
         audit: impl FnOnce(f64, ErrorEstimate, &mut E) -> Option<Audited>,
         executor: &mut E,
     ) -> Self {
         let Some(mean) = film.mean_radiance(executor) else { return Self::default() };
         let noise = ErrorEstimate::of_film(film, mean, is_correlated, executor);
-        let noise = Self { noise, ..Self::default() };
+        let noise = Self { noise, reconstructed, ..Self::default() };
         noise.audited_by(film, mean, audit, executor)
     }
 
-    /// Report of `film` with the same noise, and the newest result of its `audit`.
+    /// Report of `film` or its `reconstruction` with the same noise, and the newest result of its `audit`.
     pub fn judged_anew<F: Features, E: Executor>(
         self,
         film: &Film,
+        reconstruction: Option<&FilmReconstruction>,
         audit: &mut Audit<F>,
         executor: &mut E,
     ) -> Self {
@@ -67,7 +73,7 @@ impl ErrorReport {
             film,
             mean,
             |mean, noise, executor| {
-                audit.compare(film, mean, executor);
+                audit.compare(film, reconstruction, mean, executor);
                 audit.verdict(noise)
             },
             executor,
@@ -81,7 +87,10 @@ impl ErrorReport {
         audit: impl FnOnce(f64, ErrorEstimate, &mut E) -> Option<Audited>,
         executor: &mut E,
     ) -> Self {
-        let Some(noise) = self.noise else { return self };
+        let Some(raw) = self.noise else { return self };
+        // An audit of the reconstructed picture measures the bias of the reconstruction as well.
+        let noise = self.reconstructed.map_or(raw, |error| error.variance());
+        let without_audit = self.reconstructed.map_or(raw, |error| error.total);
         let mut audited = audit(mean, noise, executor);
         // An audit without photons measures the blur as well, unless it is blind.
         let sees_blur = |audited: &Audited| !audited.work.has_photons && !audited.is_blind;
@@ -94,6 +103,7 @@ impl ErrorReport {
             (_, None) => {}
             (Some(audited), Some(blur)) => audited.total = audited.total.with_bias(blur),
             (None, Some(blur)) => {
+                let noise = without_audit;
                 noise_and_blur = Some(NoiseAndBlur { noise, blur, total: noise.with_bias(blur) });
             }
         }
@@ -103,7 +113,8 @@ impl ErrorReport {
     /// Estimate with all parts.
     pub fn error(&self) -> Option<ErrorEstimate> {
         let audited = self.audited.as_ref().map(|audited| audited.total);
-        let found = audited.or(self.noise_and_blur.map(|noise_and_blur| noise_and_blur.total)).or(self.noise);
+        let sampled = self.reconstructed.map(|error| error.total).or(self.noise);
+        let found = audited.or(self.noise_and_blur.map(|noise_and_blur| noise_and_blur.total)).or(sampled);
         self.lacking.map_or(found, |lacking| Some(lacking.beside(found)))
     }
 

@@ -12,6 +12,7 @@ use crate::film::{Film, Pixel};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::method::caustics::{unseen, unseen_footprint};
 use crate::method::{Executor, MethodKind, Passed, RenderContext, Shard};
+use crate::reconstruction::FilmReconstruction;
 use crate::transport::caustics::tracer::CausticPhotonTracer;
 use crate::transport::path::WAVE;
 use crate::transport::{CausticMerging, PathIntegrator, PathSettings};
@@ -343,9 +344,15 @@ impl<'m, F: Features> Audit<'m, F> {
         Ok(is_complete)
     }
 
-    /// Compares the audited pixels with `film`, whose mean is `mean`.
-    pub fn compare(&mut self, film: &Film, mean: f64, executor: &mut impl Executor) {
-        self.pixels.compare(film, mean, executor);
+    /// Compares the audited pixels with `film`, whose mean is `mean`, or with its `reconstruction`.
+    pub fn compare(
+        &mut self,
+        film: &Film,
+        reconstruction: Option<&FilmReconstruction>,
+        mean: f64,
+        executor: &mut impl Executor,
+    ) {
+        self.pixels.compare(film, reconstruction, mean, executor);
     }
 
     /// Estimated bias of the picture that was last compared, whose noise is `noise`.

@@ -106,6 +106,13 @@ impl Bsdf {
         self.coat::<All>().is_some_and(|coat| coat.alpha > 0.0)
     }
 
+    /// Directional albedo of coat and base at normal incidence, an estimate; `None` without a coat.
+    pub(super) fn coated_albedo(&self) -> Option<Rgb> {
+        let coat = self.coat::<All>()?;
+        let transmittance = Rgb::from(coat.transmittance(&COATS, 1.0));
+        Some(Rgb::from(coat.reflectance(1.0)) + Rgb::from(coat.base) * transmittance * Rgb::from(coat.mean))
+    }
+
     /// Transmittance of a coat at the cosine `c`.
     #[inline]
     pub(crate) fn transmittance_at(&self, c: f32) -> Rgb {

@@ -147,6 +147,18 @@ impl Bsdf {
         }
     }
 
+    /// Directional albedo at normal incidence, an estimate; that of the transmitted light for a dielectric.
+    pub(crate) fn normal_albedo(&self) -> Rgb {
+        match self {
+            Bsdf::Diffuse(b) => b.reflectance,
+            Bsdf::Mirror(b) => b.reflectance,
+            Bsdf::Conductor(b) => b.f0,
+            Bsdf::Glossy(_) | Bsdf::Plastic(_) => self.coated_albedo().unwrap_or_default(),
+            Bsdf::Dielectric(b) => b.tint,
+            Bsdf::RoughDielectric(b) => b.tint,
+        }
+    }
+
     /// True if light passes to the other side.
     #[inline]
     pub fn transmits(&self) -> bool {

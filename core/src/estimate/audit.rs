@@ -43,10 +43,15 @@ impl PixelBias {
         if picture.even.count() == 0 || picture.odd.count() == 0 {
             return None;
         }
+        Self::of_halves([picture.even.mean(), picture.odd.mean(), picture.mean()], truth, filtered, mean)
+    }
+
+    /// The same of a pixel with these halves and their mean.
+    pub fn of_halves(picture: [Rgb; 3], truth: &Pixel, filtered: Rgb, mean: f64) -> Option<Self> {
+        let [a, b, both] = picture;
         let ([u1, u2], [v1, v2]) = (truth.even.parts()?, truth.odd.parts()?);
         let scaled = |colour: Rgb| colour.to_array().map(|value| f64::from(value) / mean);
-        let [a, b, both, filtered] =
-            [picture.even.mean(), picture.odd.mean(), picture.mean(), filtered].map(scaled);
+        let [a, b, both, filtered] = [a, b, both, filtered].map(scaled);
         let [u1, u2, v1, v2] = [u1, u2, v1, v2].map(scaled);
         let (mut bias, mut deviation, mut variances) = (0.0, 0.0, [0.0; 2]);
         for c in 0..3 {

@@ -6,6 +6,7 @@ use crate::audit::{Audit, AuditedMethod, ErrorReport, ExtraTime};
 use crate::bsdf::Features;
 use crate::memory::OutOfMemory;
 use crate::method::{Executor, RenderState};
+use crate::reconstruction::FilmReconstruction;
 
 /// Why samples do not lead to the requested error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +27,7 @@ impl Rounds {
     pub fn extend_audit<F: Features, E: Executor>(
         &self,
         (audit, method): (&mut Audit<F>, &mut (impl AuditedMethod<F> + ?Sized)),
-        (state, report): (&RenderState, ErrorReport),
+        (state, reconstruction, report): (&RenderState, Option<&FilmReconstruction>, ErrorReport),
         time: Option<ExtraTime>,
         executor: &mut E,
     ) -> Result<ErrorReport, OutOfMemory> {
@@ -39,7 +40,7 @@ impl Rounds {
             if !audit.extend(method, &mut time, executor)? {
                 break;
             }
-            report = report.judged_anew(&state.film, audit, executor);
+            report = report.judged_anew(&state.film, reconstruction, audit, executor);
         }
         Ok(report)
     }

@@ -1,5 +1,6 @@
 //! Renderer compiled for one set of features.
 
+use super::reconstructing;
 use super::rounds::{Estimates, Rounds, Stop};
 use super::{RenderError, RequiredMemory, Settings, Until};
 use crate::audit::{Audit, AuditSettings, ErrorReport, ExtraTime, MethodAtWork, Spent, audit_fraction};
@@ -17,6 +18,7 @@ use crate::method::{
     Attempt, ChosenMethod, Executor, Loop, MethodKind, MethodPlan, MethodSetup, PilotSize, RenderContext,
     RenderMethod, RenderState, Round,
 };
+use crate::reconstruction::FilmReconstruction;
 use crate::scene::Scene;
 
 /// Reading of a clock that does not exist.
@@ -33,6 +35,7 @@ pub struct FeatureRenderer<'a, F> {
     method: ChosenMethod<'a, F>,
     state: RenderState<'a>,
     audit: Option<Audit<'a, F>>,
+    reconstruction: Option<FilmReconstruction<'a>>,
     /// Light that the method cannot find.
     hidden: Option<HiddenLight>,
     /// True if the audit may continue alone, since its fraction of the work is not requested.
@@ -70,8 +73,11 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             }
             false => Default::default(),
         };
-        let structures = bvh.and(lights).and(film).and(method).and(audit).and(hidden).bytes();
-        RequiredMemory { structures, scratch: scratch.or(audit_scratch).or(hidden_scratch).bytes() }
+        let [kept, search] = reconstructing::footprints::<F>(scene, settings);
+        let later = kept.and(method).and(audit).and(hidden).or(search);
+        let structures = bvh.and(lights).and(film).and(later).bytes();
+        let scratch = scratch.or(audit_scratch).or(hidden_scratch);
+        RequiredMemory { structures, scratch: scratch.or(reconstructing::scratch::<F>(settings)).bytes() }
     }
 
     /// See [`Renderer::new`](super::Renderer::new).
@@ -97,6 +103,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         let pilots = settings.goal.rays_alone().map_or(PilotSize::USUAL, PilotSize::of_picture);
         let (paths, level) = (settings.paths(), settings.level);
         let context = RenderContext { scene, bvh, lights, settings: paths, level, pilots };
+        let reconstruction = reconstructing::set_up::<F>(&context, settings, arena, executor)?;
         let mut memory = Buffer::new(arena.slice(arena.available())?);
         let lights = learn_visibility::<F>(&context, settings, &mut memory, executor)?;
         let setup = MethodSetup {
@@ -133,7 +140,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         let hidden = at_work.hidden_light::<F>(context, settings.goal.samples, &mut memory, executor)?;
         let state = RenderState { is_correlated: kind.shares(), ..state };
         let is_audit_open = settings.audit.is_none();
-        Ok(Self { method, state, audit, hidden, is_audit_open, memory, first_noise: None })
+        Ok(Self { method, state, audit, reconstruction, hidden, is_audit_open, memory, first_noise: None })
     }
 
     /// See [`Renderer::step`](super::Renderer::step).
@@ -148,11 +155,12 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             }
             Until::Error(wanted) => self.render_until(wanted, executor)?,
         }
-        let Self { audit, state, .. } = self;
+        self.reconstruct(executor);
+        let Self { audit, reconstruction, state, .. } = self;
         if let Some(audit) = audit
             && let Some(mean) = state.film.mean_radiance(executor)
         {
-            audit.compare(&state.film, mean, executor);
+            audit.compare(&state.film, reconstruction.as_ref(), mean, executor);
         }
         Ok(())
     }
@@ -188,12 +196,22 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         executor: &mut E,
     ) -> Result<ErrorReport, OutOfMemory> {
         self.step_audit(executor)?;
-        let Self { method, state, audit, hidden, is_audit_open, .. } = self;
-        let report = ErrorReport::new(state, audit.as_mut(), executor);
+        self.reconstruct(executor);
+        let Self { method, state, audit, reconstruction, hidden, is_audit_open, .. } = self;
+        let reconstruction = reconstruction.as_ref();
+        let report = ErrorReport::new(state, reconstruction, audit.as_mut(), executor);
         let report = report.lacking(hidden.as_ref(), &state.film);
         let Some(audit) = audit else { return Ok(report) };
         let time = ExtraTime { may_take: &mut |_| true, clock: &|| NO_CLOCK };
-        rounds.extend_audit((audit, method), (state, report), is_audit_open.then_some(time), executor)
+        let time = is_audit_open.then_some(time);
+        rounds.extend_audit((audit, method), (state, reconstruction, report), time, executor)
+    }
+
+    /// Reconstructs the picture, if that is wanted.
+    fn reconstruct(&mut self, executor: &mut impl Executor) {
+        if let Some(reconstruction) = &mut self.reconstruction {
+            reconstructing::update(reconstruction, &self.state, executor);
+        }
     }
 
     /// Takes the samples of the audit that are due.
@@ -214,14 +232,21 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
     /// See [`Renderer::error_report`](super::Renderer::error_report).
     pub fn error_report(&self) -> ErrorReport {
         let RenderState { film, is_correlated, .. } = &self.state;
+        let reconstructed = self.reconstruction.as_ref().and_then(FilmReconstruction::error);
         let audit = |_: f64, noise, _: &mut Loop| self.audit.as_ref()?.verdict(noise);
-        let report = ErrorReport::of_film(film, *is_correlated, audit, &mut Loop::new(&mut []));
+        let report =
+            ErrorReport::of_film(film, (*is_correlated, reconstructed), audit, &mut Loop::new(&mut []));
         report.lacking(self.hidden.as_ref(), film)
     }
 
     /// Sums of the samples.
     pub fn film(&self) -> &Film<'a> {
         &self.state.film
+    }
+
+    /// Reconstruction of the picture, if it is wanted.
+    pub fn reconstruction(&self) -> Option<&FilmReconstruction<'a>> {
+        self.reconstruction.as_ref()
     }
 
     /// Samples of the least sampled pixel.
@@ -237,7 +262,8 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
     /// Decisions and numbers of the parts of the method.
     pub fn findings(&self) -> Findings {
         let lacking = self.hidden.as_ref().map(|hidden| hidden.lacking_in(&self.state.film).finding());
-        self.method.findings().and(lacking)
+        let made = self.reconstruction.as_ref().map(FilmReconstruction::finding);
+        self.method.findings().and(lacking).and(made)
     }
 }
 

@@ -38,6 +38,8 @@ pub struct Settings {
     /// Fraction of the work, from 0 to below 1, for an audit: path tracing of some pixels, which measures the
     /// bias. `None`: 0.05 if the method is biased, or more where the audit alone delays an error target.
     pub audit: Option<f64>,
+    /// Reconstruction of the picture, and its error, from the halves of its film.
+    pub reconstruct: Reconstruct,
 }
 
 impl Settings {
@@ -53,6 +55,7 @@ impl Settings {
             goal: Goal::default(),
             environment_visibility: None,
             audit: None,
+            reconstruct: Reconstruct::Off,
         }
     }
 
@@ -83,6 +86,16 @@ impl Settings {
             false => Ok(()),
         }
     }
+}
+
+/// Reconstruction of the picture from the two halves of its film.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reconstruct {
+    /// Where the film allows it. The film itself keeps the sums of the samples.
+    Auto,
+    /// The picture is the mean of the samples.
+    #[default]
+    Off,
 }
 
 /// Memory of a picture.

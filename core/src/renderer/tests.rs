@@ -1,6 +1,6 @@
 //! Pictures of the front with their audits, in memory of the stated size.
 
-use super::{RenderError, Renderer, RequiredMemory, Settings, Until};
+use super::{Reconstruct, RenderError, Renderer, RequiredMemory, Settings, Until};
 use crate::memory::{Arena, Line};
 use crate::method::{CacheOptions, Loop, Method, PathOptions, PhotonSettings, VirtualLightSettings};
 use crate::scene::{Camera, Material, Mesh, Scene, Triangle};
@@ -126,6 +126,38 @@ fn a_fraction_of_all_work_and_one_that_is_no_number_are_errors() {
             let settings = Settings { audit: Some(fraction), ..settings(Method::Path(PathOptions::PLAIN)) };
             let refused = render(scene, &settings, 0, |renderer, _| renderer.err());
             assert_eq!(refused, Some(RenderError::Audit), "{fraction}");
+        }
+    });
+}
+
+#[test]
+fn a_reconstructed_picture_tells_its_error_and_keeps_its_film() {
+    let paths = settings(Method::Path(PathOptions::PLAIN));
+    let lights = VirtualLightSettings { light_paths: Some(1024), connections: None };
+    let biased = settings(Method::ClampedInstantRadiosity(lights));
+    with_corner(|scene| {
+        for plain in [paths, biased] {
+            let film = render(scene, &plain, 0, |renderer, executor| {
+                let mut renderer = renderer.unwrap();
+                renderer.step(executor, Until::Samples(16)).unwrap();
+                assert!(renderer.picture().eq(renderer.film().rows()));
+                renderer.film().pixels().to_vec()
+            });
+            let settings = Settings { reconstruct: Reconstruct::Auto, ..plain };
+            render(scene, &settings, 0, |renderer, executor| {
+                let mut renderer = renderer.unwrap();
+                renderer.step(executor, Until::Samples(2)).unwrap();
+                assert!(renderer.error_report().reconstructed.is_none());
+                renderer.step(executor, Until::Samples(16)).unwrap();
+                assert!(renderer.film().pixels() == film);
+                let report = renderer.error_report();
+                let reconstructed = report.reconstructed.unwrap();
+                assert!(reconstructed.total.relmse < report.noise.unwrap().relmse, "{report:?}");
+                assert!(report.audited.is_some() || report.error() == Some(reconstructed.total));
+                assert!(!renderer.picture().eq(renderer.film().rows()));
+            });
+            let refused = render(scene, &settings, 1, |renderer, _| renderer.err());
+            assert!(matches!(refused, Some(RenderError::Memory(_))), "{refused:?}");
         }
     });
 }

@@ -12,9 +12,9 @@ use halflight::bake::{
 };
 use halflight::load::{self, LoadOptions, LoadedScene};
 use halflight::memory::Budget;
+use halflight::quantity::readable_seconds;
 use halflight::render::Stop;
 use halflight::report::file_name;
-use halflight::quantity::readable_seconds;
 use halflight::values::{Depth, Samples, TargetError};
 use halflight_core::{IrradiancePoint, LightPart};
 use serde_json::{Value, json};

@@ -11,7 +11,7 @@ use halflight::memory::Budget;
 use halflight::quantity::readable_bytes;
 use halflight::render::{
     BidirectionalSettings, CacheSettings, LobeSettings, Method, MetropolisSettings, PhotonSettings,
-    PrimarySpace, RenderError, Settings, Stop, VirtualLightSettings,
+    PrimarySpace, Reconstruct, RenderError, Settings, Stop, VirtualLightSettings,
 };
 use halflight::save::Image;
 use halflight::values::Depth;
@@ -166,6 +166,9 @@ pub(super) struct MethodArgs {
     /// biased]
     #[arg(long, value_name = "SHARE|off", value_parser = values::audit, help_heading = "Light transport")]
     audit: Option<f64>,
+    /// Reconstruction of the picture from the halves of its film; film files keep the samples [default: off]
+    #[arg(long, value_name = "WHEN", help_heading = "Results")]
+    reconstruct: Option<Reconstruction>,
     /// Seed of the random numbers [default: 0]
     #[arg(long, value_name = "N", display_order = 7)]
     seed: Option<u32>,
@@ -271,6 +274,15 @@ enum When {
     Off,
 }
 
+/// Use of the reconstruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Reconstruction {
+    /// Where its estimated error is smaller than that of the samples
+    Auto,
+    /// Never
+    Off,
+}
+
 impl When {
     /// `None` for `auto`.
     fn forced(when: Option<Self>) -> Option<bool> {
@@ -344,6 +356,10 @@ impl MethodArgs {
                 threshold: self.path_limit.map_or(settings.metropolis.threshold, |limit| limit as f32),
             },
             audit: self.audit,
+            reconstruct: match self.reconstruct {
+                Some(Reconstruction::Auto) => Reconstruct::Auto,
+                Some(Reconstruction::Off) | None => Reconstruct::Off,
+            },
             level: self.simd.map_or(level, |tier| level.capped(tier)),
             ..settings
         }

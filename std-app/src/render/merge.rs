@@ -89,10 +89,10 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
             let merged = AuditedPixels::merged(&audits?, film, mean, &mut Arena::over(&mut audited));
             // The memory is of the stated size.
             let mut merged = merged.ok()??;
-            merged.compare(film, mean, executor);
+            merged.compare(film, None, mean, executor);
             merged.verdict(noise)
         };
-        ErrorReport::of_film(film, state.is_correlated, judge, executor)
+        ErrorReport::of_film(film, (state.is_correlated, None), judge, executor)
     });
     Ok(Merged {
         image: image(&state.film),

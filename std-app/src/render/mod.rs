@@ -22,6 +22,7 @@ mod merge;
 mod method;
 mod picture;
 mod points;
+mod reconstruction;
 mod rejected_tiles;
 mod run;
 mod setup;
@@ -41,7 +42,7 @@ pub use halflight_core::method::counts::Choice;
 pub use halflight_core::method::instant_radiosity::VirtualLightSettings;
 pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Method, PhotonSettings};
-pub use halflight_core::renderer::{Stop, StopRule};
+pub use halflight_core::renderer::{Reconstruct, Stop, StopRule};
 pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
@@ -109,6 +110,8 @@ pub struct Settings {
     /// Share of the work that goes into the audit, from 0 (no audit) to 1. `None`: 0.05 if the method is
     /// biased.
     pub audit: Option<f64>,
+    /// Reconstruction of the picture from the halves of its film. The film file keeps the samples.
+    pub reconstruct: Reconstruct,
     /// Part of the picture to render.
     pub shard: Shard,
     /// Film file to write during the render.
@@ -165,6 +168,7 @@ impl Default for Settings {
             stop: Stop::default(),
             reference: None,
             audit: None,
+            reconstruct: Reconstruct::Off,
             shard: Shard::WHOLE,
             checkpoint: None,
             resume: None,

@@ -7,6 +7,7 @@ use super::history::{Clock, Reference, Round};
 use super::image::{by_rows, image, of_size, without_gaps};
 use super::memory::Memory;
 use super::method::Renderer;
+use super::reconstruction;
 use super::rejected_tiles::{self, empty_pixels};
 use super::setup::RenderSetup;
 use super::survey::Survey;
@@ -21,6 +22,7 @@ use halflight_core::film::Pixel;
 use halflight_core::findings::{Findings, Value};
 use halflight_core::method::hidden_light::HiddenLight;
 use halflight_core::method::{RenderState, Shard};
+use halflight_core::reconstruction::FilmReconstruction;
 use halflight_core::renderer::{OutOfReach, Plan, Rounds};
 use rayon::prelude::*;
 use std::path::Path;
@@ -52,6 +54,7 @@ pub(super) struct Picture<'a, 'm, F> {
     pub(super) setup: RenderSetup<'a>,
     pub(super) state: RenderState<'a>,
     pub(super) audit: Option<ThreadedAudit<'a, F>>,
+    pub(super) reconstruction: Option<FilmReconstruction<'a>>,
     /// Light that the method cannot find.
     pub(super) hidden: Option<HiddenLight>,
     /// Memory that the audit borrows.
@@ -201,10 +204,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
     fn estimate(&mut self, renderer: &mut dyn Renderer<F>) -> Result<Option<ErrorEstimate>, RenderError> {
         self.step_audit(renderer)?;
         let start = Instant::now();
-        let Picture { setup, state, audit, hidden, .. } = &mut self.picture;
-        let audit = audit.as_mut().map(|audit| &mut audit.audit);
-        let mut report = setup.workers.estimating(|executor| ErrorReport::new(state, audit, executor));
-        report = report.lacking(hidden.as_ref(), &state.film);
+        let mut report = self.judge();
         self.estimating = start.elapsed().as_secs_f64();
         self.estimated += self.estimating;
         report = self.extend_audit(report, renderer)?;
@@ -244,7 +244,8 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         report: ErrorReport,
         renderer: &mut dyn Renderer<F>,
     ) -> Result<ErrorReport, RenderError> {
-        let Picture { setup, state, audit, clock, progress, interrupt, .. } = &mut self.picture;
+        let Picture { setup, state, audit, reconstruction: made, clock, progress, interrupt, .. } =
+            &mut self.picture;
         let (RenderSetup { settings, workers, .. }, rounds) = (*setup, &self.rounds);
         let Some(audit) = audit else { return Ok(report) };
         let (left, start) = (settings.stop.seconds.map(|limit| limit - self.estimating), Instant::now());
@@ -258,7 +259,15 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         let time = ExtraTime { may_take: &mut may_take, clock: &|| start.elapsed().as_secs_f64() };
         let (audit, mut executor) = audit.at_work(workers);
         let time = settings.audit.is_none().then_some(time);
-        Ok(rounds.extend_audit((audit, renderer), (state, report), time, &mut executor)?)
+        Ok(rounds.extend_audit((audit, renderer), (state, made.as_ref(), report), time, &mut executor)?)
+    }
+
+    /// Reconstructs the picture, if that is wanted, and estimates its error.
+    fn judge(&mut self) -> ErrorReport {
+        let Picture { setup, state, audit, reconstruction, hidden, .. } = &mut self.picture;
+        let audit = audit.as_mut().map(|audit| &mut audit.audit);
+        let report = reconstruction::judge(reconstruction, state, audit, setup.workers);
+        report.lacking(hidden.as_ref(), &state.film)
     }
 
     /// Writes the film file, during the render or at the end with patience `last`.
@@ -306,13 +315,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             self.write_film(self.picture.clock.seconds(), Some(patience));
         }
         let start = Instant::now();
-        let Picture { setup, state, audit, hidden, .. } = &mut self.picture;
-        let audit = audit.as_mut().map(|audit| &mut audit.audit);
-        let anew = || {
-            let report = setup.workers.estimating(|executor| ErrorReport::new(state, audit, executor));
-            report.lacking(hidden.as_ref(), &state.film)
-        };
-        let report = self.report.take().unwrap_or_else(anew);
+        let report = self.report.take().unwrap_or_else(|| self.judge());
         self.estimated += start.elapsed().as_secs_f64();
         self.result(report, renderer, interrupted)
     }
@@ -323,7 +326,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         renderer: &mut dyn Renderer<F>,
         interrupted: bool,
     ) -> Result<RenderResult, RenderError> {
-        let Picture { method, setup, state, clock, sketch, .. } = &self.picture;
+        let Picture { method, setup, state, reconstruction, clock, sketch, .. } = &self.picture;
         let RenderSetup { settings, workers, .. } = *setup;
         let render = clock.seconds();
         let error = report.error();
@@ -334,6 +337,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         let values = |pixel: Pixel| (pixel.count(), (pixel.mean().to_array(), pixel.variance().to_array()));
         let (samples, (mean, variance)): (Vec<u32>, (Vec<_>, Vec<_>)) =
             workers.install(|| by_rows(film, values).unzip());
+        let mean = reconstruction::picture(reconstruction.as_ref()).unwrap_or(mean);
         let (image, filled_pixels) = without_gaps(of_size(film, mean), &samples, (state, sketch, workers));
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
@@ -356,6 +360,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             counters: state.counters,
             findings: findings
                 .and(report.lacking.map(|lacking| lacking.finding()))
+                .and(reconstruction.as_ref().map(FilmReconstruction::finding))
                 .and(survey.as_ref().map(Survey::finding)),
             survey,
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },

@@ -11,7 +11,7 @@ use super::setup::RenderSetup;
 use super::threads::{Pool, Workers};
 use super::{
     Ending, MOST_PIXELS, Method, Progress, RenderError, RenderResult, Seconds, Settings,
-    environment_visibility, gaps,
+    environment_visibility, gaps, reconstruction,
 };
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
@@ -159,6 +159,7 @@ impl WithFeatures for Render<'_> {
         let mut may_fall_back = is_open;
         loop {
             let mut own = memory.within();
+            let reconstruction = reconstruction::set_up::<F>(&setup, &mut own)?;
             let Ready { mut renderer, audit, hidden } = match method::set_up::<F>(plan, &setup, &mut own) {
                 Ok(Attempt::Ready(ready)) => *ready,
                 Ok(Attempt::Instead(better)) => {
@@ -179,6 +180,7 @@ impl WithFeatures for Render<'_> {
                 setup,
                 state: request.state(&mut film)?,
                 audit,
+                reconstruction,
                 hidden,
                 memory: &mut own,
                 identity: request.identity(method),

@@ -129,6 +129,20 @@ mod tests {
     }
 
     #[test]
+    fn study_reconstruction_compares_with_a_reference() {
+        let view = "--eye 278,273,-800 --look-at 278,273,0 --fov 39.3";
+        let study = object(&format!(
+            "study reconstruction {CORNELL} {view} --size 64x64 --spp 16 --reference-spp 256 --threads 2"
+        ));
+        let number = |key: &str| study["pictures"][0][key].as_f64().unwrap();
+        assert!(
+            number("reconstructed") < number("raw") && number("reference") < 0.2 * number("raw"),
+            "{study}"
+        );
+        assert!((number("estimated_raw") / number("raw") - 1.0).abs() < 0.3, "{study}");
+    }
+
+    #[test]
     fn bad_input_is_refused_with_its_reason() {
         for (line, reason) in [
             ("bench", "rays"),

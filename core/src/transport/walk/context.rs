@@ -124,7 +124,13 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// True if a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`
     /// (evaluated for cut-outs only), or the ray's own triangle, hit by rounding.
     #[inline]
-    fn is_skipped(&self, point: &SurfacePoint, hit: &Hit, left: u32, random: impl FnOnce() -> f32) -> bool {
+    pub(crate) fn is_skipped(
+        &self,
+        point: &SurfacePoint,
+        hit: &Hit,
+        left: u32,
+        random: impl FnOnce() -> f32,
+    ) -> bool {
         hit.triangle == left || F::CUTOUT && point.material.has_cutout() && random() >= self.opacity_at(point)
     }
 

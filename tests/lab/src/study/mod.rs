@@ -2,6 +2,8 @@
 
 mod irradiance;
 mod radiance;
+mod reconstruction;
+mod threads;
 
 use crate::Result;
 use crate::output::Output;
@@ -19,6 +21,7 @@ pub(crate) struct Study {
 enum Subject {
     Irradiance(Box<irradiance::Irradiance>),
     Radiance(radiance::Radiance),
+    Reconstruction(reconstruction::Reconstruction),
 }
 
 impl Study {
@@ -26,6 +29,7 @@ impl Study {
         match &self.subject {
             Subject::Irradiance(study) => study.run(output),
             Subject::Radiance(study) => study.run(output),
+            Subject::Reconstruction(study) => study.run(output),
         }
     }
 }

@@ -22,6 +22,7 @@ const LAYERS: &[&str] = &[
     "census",
     "transport",
     "method",
+    "reconstruction",
     "audit",
     "renderer",
     "parts",

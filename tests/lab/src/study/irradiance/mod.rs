@@ -3,11 +3,11 @@
 mod points;
 mod report;
 mod search;
-mod threads;
 
 use crate::Result;
 use crate::flags::{self, CameraArgs};
 use crate::output::Output;
+use crate::study::threads::Threads;
 use clap::Args;
 use halflight::load::{LoadOptions, load};
 use halflight::pages::Pages;
@@ -26,7 +26,6 @@ use search::Search;
 use serde_json::json;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
-use threads::Threads;
 
 /// Error metrics of the irradiance cache at equal numbers of records
 ///

@@ -1,8 +1,8 @@
 //! Held-out points of a picture, for which no record was made, with their exact indirect irradiance.
 
 use super::Tracer;
-use super::threads::Threads;
 use crate::Result;
+use crate::study::threads::Threads;
 use halflight::pages::Pages;
 use halflight_core::Rgb;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};

@@ -9,11 +9,11 @@ use std::sync::Mutex;
 use std::thread;
 
 /// Threads by their scratch memory.
-pub(super) struct Threads(Vec<Pages>);
+pub(crate) struct Threads(Vec<Pages>);
 
 impl Threads {
     /// `count` threads with `scratch` bytes each.
-    pub(super) fn new(count: usize, scratch: Footprint) -> Result<Self, OutOfMemory> {
+    pub(crate) fn new(count: usize, scratch: Footprint) -> Result<Self, OutOfMemory> {
         Ok(Self((0..count.max(1)).map(|_| Pages::new(scratch)).collect::<Result<_, _>>()?))
     }
 }
