@@ -1,5 +1,10 @@
 //! Irradiance at points, each with a 95 % interval, in the caller's memory and on the caller's threads.
 
+mod layout;
+mod value;
+
+pub use value::{PointIrradiance, PointSettings};
+
 use super::{RenderError, RequiredMemory, Until};
 use crate::bsdf::{All, DiffuseTextured, Features, Opaque};
 use crate::bvh::Bvh;
@@ -8,13 +13,11 @@ use crate::estimate::{POOLED_POINTS, half_width, point_variances};
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE};
 use crate::light::{LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::method::{
-    Executor, IrradiancePoints, PilotSize, RenderContext, RenderMethod, RenderState, Round, Shard,
-};
+use crate::method::{Executor, IrradiancePoints, PilotSize, RenderContext, RenderMethod, RenderState, Round};
 use crate::scene::Scene;
-use crate::transport::{Counters, IrradiancePoint, LightPart, PathSettings, UNLIMITED};
-use crate::{Level, Rgb};
+use crate::transport::{Counters, IrradiancePoint, PathSettings, UNLIMITED};
 use glam::Vec3;
+use layout::{Layout, number_of, order_along_curve};
 use libm::{ceil, fmin, sqrt};
 
 /// Samples of a tile between two questions whether the executor is over.
@@ -37,47 +40,6 @@ const MOST_POINTS: usize = 1 << 30;
 
 /// Most samples of a point.
 const MOST_SAMPLES: u32 = 1 << 30;
-
-/// Settings of irradiance at points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointSettings {
-    /// Seed of all random numbers.
-    pub seed: u32,
-    /// Most segments of a path; 2 is direct light. `None`: no limit.
-    pub max_depth: Option<u32>,
-    /// Highest instruction set to use. [`Level::BASELINE`] gives the same bits on every target.
-    pub level: Level,
-    /// Part of the points to estimate, in tiles of 256 near points.
-    pub shard: Shard,
-    /// Light to estimate.
-    pub light: LightPart,
-}
-
-impl Default for PointSettings {
-    fn default() -> Self {
-        Self { seed: 0, max_depth: None, level: Level::detect(), shard: Shard::WHOLE, light: LightPart::All }
-    }
-}
-
-/// Irradiance of a point and its interval.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PointIrradiance {
-    /// Irradiance in W/m² on the side of the normal.
-    pub irradiance: Rgb,
-    /// Lower end of the 95 % interval of its luminance.
-    pub lower: f32,
-    /// Upper end; infinite below four samples.
-    pub upper: f32,
-    /// Number of samples.
-    pub samples: u32,
-}
-
-impl PointIrradiance {
-    /// Luminance of the irradiance.
-    pub fn value(&self) -> f32 {
-        luminance(self.irradiance)
-    }
-}
 
 /// Irradiance of many points in progress.
 pub struct IrradianceRenderer<'a> {
@@ -206,7 +168,7 @@ impl<'a> IrradianceRenderer<'a> {
     pub fn values(&self) -> impl Iterator<Item = PointIrradiance> + '_ {
         let Parts { layout, places, state, half_widths, .. } = self.parts();
         let each = places.chunks(layout.replicates);
-        each.map(move |places| PointIrradiance::of_replicates(places, &state.film.pixels(), half_widths))
+        each.map(move |places| PointIrradiance::of_replicates(places, state.film.pixels(), half_widths))
     }
 
     /// Samples of the least sampled point.
@@ -232,55 +194,6 @@ impl<'a> IrradianceRenderer<'a> {
 
     fn parts(&self) -> &Parts<'a> {
         of_build!(&self.build, renderer => &renderer.parts)
-    }
-}
-
-impl PointIrradiance {
-    /// Mean of the replicates of a point at these `places` of the film.
-    fn of_replicates(places: &[u32], pixels: &[Pixel], half_widths: &[f32]) -> Self {
-        let (mut sum, mut squares, mut samples) = (Rgb::ZERO, 0.0, 0);
-        for &place in places {
-            let pixel = pixels.get(place as usize).copied().unwrap_or_default();
-            let half_width = half_widths.get(place as usize).copied().unwrap_or(f32::INFINITY);
-            sum += pixel.mean();
-            squares += half_width * half_width;
-            samples += pixel.count();
-        }
-        let count = places.len().max(1) as f32;
-        let (irradiance, half_width) = (sum / count, libm::sqrtf(squares) / count);
-        let value = luminance(irradiance);
-        Self { irradiance, lower: (value - half_width).max(0.0), upper: value + half_width, samples }
-    }
-}
-
-/// Points of a film and their replicates.
-#[derive(Clone, Copy)]
-struct Layout {
-    points: usize,
-    /// Pixels of each point, so that few points are pooled as well.
-    replicates: usize,
-}
-
-impl Layout {
-    fn of(points: usize) -> Self {
-        Self { points, replicates: POOLED_POINTS.div_ceil(points.clamp(1, POOLED_POINTS)) }
-    }
-
-    fn pixels(&self) -> usize {
-        self.points * self.replicates
-    }
-
-    fn tiles(&self) -> usize {
-        self.pixels().div_ceil(PIXELS_PER_TILE)
-    }
-
-    fn footprint(&self) -> Footprint {
-        let film = RenderState::footprint(TILE, TILE * self.tiles() as u32);
-        film.slice::<IrradiancePoint>(self.pixels())
-            .slice::<u64>(self.pixels())
-            .slice::<u32>(self.pixels())
-            .slice::<f32>(self.pixels())
-            .slice::<u8>(self.tiles())
     }
 }
 
@@ -462,35 +375,6 @@ impl Parts<'_> {
             *finished |= u8::from(within as f64 >= WITHIN * pixels.len() as f64);
         }
     }
-}
-
-/// Writes the places of all replicates of `points` along a Z-curve of position and octant of the normal:
-/// each key ends with the number of the replicate.
-fn order_along_curve(points: &[IrradiancePoint], replicates: usize, keys: &mut [u64]) {
-    let positions = || points.iter().map(|point| Vec3::from(point.position));
-    let lowest = positions().fold(Vec3::INFINITY, Vec3::min);
-    let size = (positions().fold(Vec3::NEG_INFINITY, Vec3::max) - lowest).max_element();
-    let scale = if size > 0.0 { 1023.0 / size } else { 0.0 };
-    for (number, key) in keys.iter_mut().enumerate() {
-        let Some(point) = points.get(number / replicates) else { continue };
-        let cell = ((Vec3::from(point.position) - lowest) * scale).to_array();
-        let curve = (0..3).fold(0, |curve, axis| curve | spread(cell[axis] as u32) << axis);
-        let octant = (0..3).fold(0, |octant, axis| octant | u64::from(point.normal[axis] < 0.0) << axis);
-        *key = (curve << 3 | octant) << NUMBER_BITS | number as u64;
-    }
-    keys.sort_unstable();
-}
-
-/// Bits of the number of a replicate in its key.
-const NUMBER_BITS: u32 = 31;
-
-fn number_of(key: u64) -> usize {
-    (key & ((1 << NUMBER_BITS) - 1)) as usize
-}
-
-/// The ten low bits of `x`, three apart.
-fn spread(x: u32) -> u64 {
-    (0..10).fold(0, |bits, bit| bits | u64::from(x >> bit & 1) << (3 * bit))
 }
 
 #[cfg(test)]

@@ -18,8 +18,8 @@ pub struct Sensor {
     pub normal: [f64; 3],
 }
 
-/// Reads the sensors of a file in at most `most` bytes of memory; `-` is standard input. Empty lines and lines
-/// from `#` on are skipped.
+/// Reads the sensors of a file in at most `most` bytes of memory; `-` is standard input. Empty lines and
+/// lines from `#` on are skipped.
 ///
 /// # Errors
 /// An unreadable file; a line without six finite numbers or with a normal of length 0; no line.

@@ -23,9 +23,9 @@ use std::process::ExitCode;
 
 /// Estimate irradiance at points, each with its 95 % interval
 ///
-/// Points are the sensors of a grid, a line `x y z nx ny nz` each, or the vertices of the scene. A sensor that
-/// lies on a surface within rounding is put on it, on the side of its normal. The first of --spp, --time and
-/// --error that holds ends the work; without one it ends when the intervals are 2 %, or after 60 s.
+/// Points are the sensors of a grid, a line `x y z nx ny nz` each, or the vertices of the scene. A sensor
+/// that lies on a surface within rounding is put on it, on the side of its normal. The first of --spp, --time
+/// and --error that holds ends the work; without one it ends when the intervals are 2 %, or after 60 s.
 #[derive(Args)]
 pub(super) struct Bake {
     /// Scene: a mesh (.obj) or a scene file (.toml)

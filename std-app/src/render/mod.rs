@@ -48,6 +48,7 @@ pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{MapView, PhotonView};
 pub(crate) use points::with_points;
+pub use points::{BakeProgress, BakeSettings, Baked};
 pub use rejected_tiles::RejectedTile;
 pub(crate) use run::Request;
 pub use run::render;

@@ -105,12 +105,14 @@ impl IrradiancePoint {
     }
 
     /// The same with the random numbers of `number`.
+    #[doc(hidden)]
     pub fn numbered(self, number: u32) -> Self {
         Self { number, ..self }
     }
 
-    /// A free point that lies on a surface within rounding is put on it, on the side of its normal: sensors at
-    /// height 0 of a floor are above the floor. Other points stay.
+    /// A free point that lies on a surface within rounding is put on it, on the side of its normal: sensors
+    /// at height 0 of a floor are above the floor. Other points stay.
+    #[doc(hidden)]
     pub fn settled<F: Features>(self, context: &SceneContext<F>) -> Self {
         let (position, normal) = (Vec3::from(self.position), Vec3::from(self.normal));
         if self.triangle != MISS {
@@ -137,6 +139,7 @@ impl IrradiancePoint {
     }
 
     /// The white surface at the point.
+    #[doc(hidden)]
     pub fn surface<'a>(&self) -> SurfacePoint<'a> {
         SurfacePoint {
             position: self.position.into(),
