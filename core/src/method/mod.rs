@@ -61,7 +61,7 @@ use crate::findings::Findings;
 use crate::light::{EmissionSampler, LightSampler};
 use crate::memory::{Arena, OutOfMemory};
 use crate::photon::PhotonMap;
-use crate::scene::Scene;
+use crate::scene::{PointLight, Scene};
 use crate::transport::photon_mapping::focus::visible_focus;
 use crate::transport::{PathIntegrator, PathSettings, RadiusSchedule, SceneContext};
 
@@ -101,8 +101,11 @@ impl<'a> RenderContext<'a> {
 
     /// Emission of photons by power, in an arena of [`EmissionSampler::footprint`].
     pub(crate) fn emission<'m>(&self, arena: &mut Arena<'m>) -> Result<EmissionSampler<'m>, OutOfMemory> {
-        let focus =
-            visible_focus((self.scene, &self.bvh), [self.settings.width, self.settings.height], self.level);
+        let is_distant = |light: &PointLight| matches!(light, PointLight::Directional { .. });
+        let has_distant = self.scene.environment.is_some() || self.scene.lights.iter().any(is_distant);
+        let size = [self.settings.width, self.settings.height];
+        // Other lights need no focus: their photons start at surfaces.
+        let focus = has_distant.then(|| visible_focus((self.scene, &self.bvh), size, self.level)).flatten();
         EmissionSampler::build_around(self.scene, &self.lights, (&self.bvh.bounds(), focus), arena)
     }
 

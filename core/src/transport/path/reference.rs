@@ -36,7 +36,7 @@ pub fn radiance(
     let is_on_silhouette = is_on_silhouette(scene, lights, settings, [x, y]);
     let (from, normal) = (Vec3::ZERO, Vec3::ZERO);
     let start = Start { ray, from, normal, pdf: f32::INFINITY, triangle: MISS, segments: 1 };
-    let radiance = follow(&context, &sampler, max_depth, is_on_silhouette, start);
+    let radiance = follow(&context, &sampler, max_depth, is_on_silhouette, (start, Rgb::ZERO));
     let mut lamps = Rgb::ZERO;
     if is_on_silhouette {
         for ray in silhouette::rays(scene, settings, [x, y], sample) {

@@ -46,7 +46,7 @@ pub fn irradiance(
         triangle: point.triangle,
         segments: 2,
     };
-    (direct + follow(&context, sampler, max_depth, false, start)) * PI
+    follow(&context, sampler, max_depth, false, (start, direct)) * PI
 }
 
 /// Ray of a path, and the vertex at its origin.
@@ -89,15 +89,16 @@ impl Start {
     }
 }
 
-/// Radiance along the ray of `start`; if `is_on_silhouette`, without emission of the first surface.
+/// `found` and the radiance along the ray of `start`; if `is_on_silhouette`, without emission of the first
+/// surface.
 pub(super) fn follow(
     context: &SceneContext<All>,
     sampler: &Sampler,
     max_depth: u32,
     is_on_silhouette: bool,
-    mut start: Start,
+    (mut start, found): (Start, Rgb),
 ) -> Rgb {
-    let (mut radiance, mut throughput) = (Rgb::ZERO, Rgb::ONE); // L, β
+    let (mut radiance, mut throughput) = (found, Rgb::ONE); // L, β
     let (mut eta_squared, mut crossings) = (1.0, 0);
     while start.segments <= MAX_VERTICES && crossings <= MAX_CROSSINGS {
         let (ray, segments) = (start.ray, start.segments);
