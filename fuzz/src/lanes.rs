@@ -184,7 +184,10 @@ impl Kernel for Packing {
             fields: FIELDS.map(|(from, width)| simd.field16(&words, from, width).to_array()),
             bytes: simd.bytes16(&low_bytes(&words)).to_array(),
             picked: simd.pick16(simd.load16(&operands.a), simd.load16(&places(&words))).to_array(),
-            neighbours: simd.load16(&places(&words)).neighbours(&TABLE).map(|lanes| lanes.to_array()),
+            neighbours: simd
+                .load16(&places(&words).map(f32::floor))
+                .neighbours(&TABLE)
+                .map(|lanes| lanes.to_array()),
             powers: simd.powers16(&words).to_array(),
             smallest: simd.load16(&operands.a).smallest(),
         }
