@@ -8,6 +8,7 @@
 //! | [`Scene`] | borrowed views of the triangles, materials, textures, lights and the camera |
 //! | [`Settings`] | size of the picture, [`Method`] with its options, seed, audit |
 //! | [`Renderer`] | a picture in progress: [`Renderer::step`], [`Renderer::error`], [`Renderer::picture`] |
+//! | [`IrradianceRenderer`] | irradiance at many points, each with a 95 % interval |
 //! | [`Arena`] | the caller's bytes, of which [`Renderer::required_memory`] says the number |
 //! | [`Executor`] | the caller's threads; [`Loop`] is one thread |
 //!
