@@ -1,6 +1,7 @@
 //! Renderer of a picture: any method, in the caller's memory, on the caller's threads.
 
 mod audited;
+mod build;
 mod error;
 mod of_features;
 mod points;
@@ -28,6 +29,7 @@ use crate::findings::Findings;
 use crate::memory::Arena;
 use crate::method::{Executor, MethodKind};
 use crate::scene::Scene;
+use build::{Build, build_for, of_build};
 
 /// A picture in progress.
 ///
@@ -37,25 +39,12 @@ use crate::scene::Scene;
 /// The scene decides which of three builds of each method runs: for diffuse surfaces, for opaque ones, or for
 /// all. A device with little memory for code has one of them alone by [`FeatureRenderer`].
 pub struct Renderer<'a> {
-    build: Build<'a>,
+    build: Builds<'a>,
 }
 
-enum Build<'a> {
-    Diffuse(FeatureRenderer<'a, DiffuseTextured>),
-    Opaque(FeatureRenderer<'a, Opaque>),
-    All(FeatureRenderer<'a, All>),
-}
-
-/// Runs `$work` on the build of a renderer.
-macro_rules! of_build {
-    ($build:expr, $renderer:ident => $work:expr) => {
-        match $build {
-            Build::Diffuse($renderer) => $work,
-            Build::Opaque($renderer) => $work,
-            Build::All($renderer) => $work,
-        }
-    };
-}
+/// Builds of one renderer.
+type Builds<'a> =
+    Build<FeatureRenderer<'a, DiffuseTextured>, FeatureRenderer<'a, Opaque>, FeatureRenderer<'a, All>>;
 
 impl<'a> Renderer<'a> {
     /// Memory of a picture of `scene`, before anything is built: of the arena, and of each worker.
@@ -79,11 +68,7 @@ impl<'a> Renderer<'a> {
         arena: &mut Arena<'a>,
         executor: &mut impl Executor,
     ) -> Result<Self, RenderError> {
-        let build = match Census::of(scene).plan().features {
-            FeatureSet::Diffuse => Build::Diffuse(FeatureRenderer::new(scene, settings, arena, executor)?),
-            FeatureSet::Opaque => Build::Opaque(FeatureRenderer::new(scene, settings, arena, executor)?),
-            FeatureSet::All => Build::All(FeatureRenderer::new(scene, settings, arena, executor)?),
-        };
+        let build = build_for!(scene, FeatureRenderer::new(scene, settings, arena, executor)?);
         Ok(Self { build })
     }
 

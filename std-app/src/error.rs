@@ -37,7 +37,7 @@ impl Error {
         }
     }
 
-    /// What to do; empty if the problem says it.
+    /// Advice; empty if the problem says it.
     pub fn help(&self) -> &str {
         match self {
             Self::Load(error) => &error.help,

@@ -26,24 +26,29 @@ pub struct ErrorReport {
 }
 
 impl ErrorReport {
-    /// Report of a picture, or of its `reconstruction`, with the result of its `audit` if it has one.
+    /// Report of a picture, or of its `reconstruction`, which is made anew, with the result of its `audit` if
+    /// it has one.
     pub fn new<F: Features, E: Executor>(
         state: &RenderState,
-        reconstruction: Option<&FilmReconstruction>,
+        reconstruction: Option<&mut FilmReconstruction>,
         audit: Option<&mut Audit<F>>,
         executor: &mut E,
     ) -> Self {
         let film = &state.film;
-        Self::of_film(
-            film,
-            (state.is_correlated, reconstruction.and_then(FilmReconstruction::error)),
-            |mean, noise, executor| {
-                let audit = audit?;
-                audit.compare(film, reconstruction, mean, executor);
-                audit.verdict(noise)
-            },
-            executor,
-        )
+        let mean = film.mean_radiance(executor);
+        let noise = mean.and_then(|mean| ErrorEstimate::of_film(film, mean, state.is_correlated, executor));
+        let reconstruction = reconstruction.map(|made| {
+            made.update(film, noise, executor);
+            &*made
+        });
+        let Some(mean) = mean else { return Self::default() };
+        let reconstructed = reconstruction.and_then(FilmReconstruction::error);
+        let judge = |mean, noise, executor: &mut E| {
+            let audit = audit?;
+            audit.compare(film, reconstruction, mean, executor);
+            audit.verdict(noise)
+        };
+        Self { noise, reconstructed, ..Self::default() }.audited_by(film, mean, judge, executor)
     }
 
     /// Report of `film`, whose errors are correlated between distant pixels or not, or of its reconstruction

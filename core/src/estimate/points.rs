@@ -1,8 +1,8 @@
 //! Intervals of values at points from the film alone: variance pooled over near points, with a trend in the
 //! brightness of the neighbours (after the moderated variances of Smyth 2004).
 //!
-//! Where light is rare, most points have not met it, and their own samples do not show its variance; those
-//! of near points do. For a block of points with the half-means A and B and the four quarter-means q:
+//! Most points have not met rare light, and their own samples do not show its variance; those of near points
+//! do. For a block of points with the half-means A and B and the four quarter-means q:
 //!
 //! 1. m = (A + B) / 2. The mean of (A − B)² / 4 over the block is s, the variance of m. The variance of the
 //!    quarters v = Σ (q − m)² / 12 has its shape.

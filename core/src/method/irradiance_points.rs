@@ -1,7 +1,7 @@
 //! Irradiance at many points by path tracing (Kajiya 1986): a film whose pixels are points.
 
 use super::executor::Executor;
-use super::{RenderContext, RenderMethod, Round};
+use super::{RenderContext, Round};
 use crate::bsdf::Features;
 use crate::film::PIXELS_PER_TILE;
 use crate::memory::{Footprint, OutOfMemory};
@@ -27,34 +27,19 @@ impl<'a, F: Features> IrradiancePoints<'a, F> {
         Self { integrator: context.integrator(), points, part }
     }
 
-    /// The points, in the order of the film.
-    pub fn points(&self) -> &'a [IrradiancePoint] {
-        self.points
-    }
-
-    /// Samples of the tiles that are not `finished`.
+    /// Samples of the tiles that are open.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the scratch of the executor is too small.
-    pub fn sample_unfinished<E: Executor>(
+    pub fn sample<E: Executor>(
         &self,
         round: &mut Round<E>,
-        finished: impl Fn(usize) -> bool + Send + Sync,
+        is_open: impl Fn(usize) -> bool + Send,
     ) -> Result<(), OutOfMemory> {
         let Self { integrator, points, part } = self;
-        round.open_tiles(
-            u32::MAX,
-            |tile| !finished(tile),
-            |tile, samples, scratch, pixels| {
-                let of_tile = points.chunks(PIXELS_PER_TILE).nth(tile).unwrap_or(&[]);
-                integrator.sample_irradiance((of_tile, *part), samples, WAVE, scratch, pixels)
-            },
-        )
-    }
-}
-
-impl<F: Features> RenderMethod for IrradiancePoints<'_, F> {
-    fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
-        self.sample_unfinished(round, |_| false)
+        round.open_tiles(u32::MAX, is_open, |tile, samples, scratch, pixels| {
+            let of_tile = points.chunks(PIXELS_PER_TILE).nth(tile).unwrap_or(&[]);
+            integrator.sample_irradiance((of_tile, *part), samples, WAVE, scratch, pixels)
+        })
     }
 }

@@ -6,7 +6,7 @@
 //! (Ward 1991, "Real Pixels") and have 11, 11 and 10 bits; the error is below 0.05 % of the largest channel,
 //! 0.1 % in blue.
 //!
-//! Where paths have a limit of length, the two lowest bits of red and of green hold the number of segments
+//! With a limit of path length, the two lowest bits of red and of green hold the number of segments
 //! that the path has left. Red and green then have an error below 0.35 % of the largest channel, without
 //! bias.
 

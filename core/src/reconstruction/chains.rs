@@ -34,7 +34,7 @@ const DIM: u32 = u32::MAX - 1;
 /// Opacity of the surface after `n` others: dimension `CROSSING + n`.
 const CROSSING: u32 = 1 << 31;
 
-/// What a ray sees.
+/// Surface at the end of a ray.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Seen {
@@ -334,7 +334,7 @@ impl<'a, F: Features> Chains<'a, F> {
 }
 
 impl Flat {
-    /// What `ray` sees at the end.
+    /// Surface at the end of `ray`.
     fn put(&self, ray: &Ray, seen: &mut Seen) {
         let is_front = self.normal.dot(ray.direction.into()) <= 0.0;
         seen.normal = if is_front { self.normal } else { -self.normal }.to_array();

@@ -5,7 +5,7 @@
 //! so that the light of each pixel is divided among its blocks, and each block spreads its part.
 
 use super::Both;
-use super::fit::View;
+use super::fit::{MOST_AROUND, View};
 use super::surfaces::NO_CLUSTER;
 
 /// Multiple of the spread of the neighbours above their median that is no firefly.
@@ -17,14 +17,8 @@ const OF_MEDIAN_DEVIATION: f32 = 1.4826;
 /// Excess in units of the median that is no firefly.
 const OF_MEDIAN: f32 = 0.02;
 
-/// Neighbours on each side.
-const RADIUS: usize = 2;
-
 /// Fewest neighbours of the same cluster.
 const FEWEST: usize = 10;
-
-/// Neighbours at most.
-const MOST: usize = (2 * RADIUS + 1) * (2 * RADIUS + 1) - 1;
 
 /// The part of the light of both halves of a pixel that exceeds its neighbours.
 pub(super) fn excess(view: &View, [x, y]: [usize; 2]) -> Both {
@@ -34,15 +28,11 @@ pub(super) fn excess(view: &View, [x, y]: [usize; 2]) -> Both {
     if cluster == NO_CLUSTER {
         return excess;
     }
-    let rows = y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(view.height);
-    let columns = x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(view.width);
-    let (mut near, mut count) = ([[0.0f32; MOST]; 2], 0);
-    for other in rows.flat_map(|row| columns.clone().map(move |column| row * view.width + column)) {
-        if other != own && view.whole[other] == cluster {
-            let light = brightness(&view.values[other]);
-            (near[0][count], near[1][count]) = (light[0], light[1]);
-            count += 1;
-        }
+    let (mut near, mut count) = ([[0.0f32; MOST_AROUND]; 2], 0);
+    for other in view.around([x, y]).filter(|other| view.whole[*other] == cluster) {
+        let light = brightness(&view.values[other]);
+        (near[0][count], near[1][count]) = (light[0], light[1]);
+        count += 1;
     }
     if count < FEWEST {
         return excess;

@@ -41,6 +41,23 @@ pub(super) struct View<'p> {
     pub whole: &'p [u32],
 }
 
+/// Pixels on each side of [`View::around`].
+const AROUND: usize = 2;
+
+/// Most pixels of [`View::around`].
+pub(super) const MOST_AROUND: usize = (2 * AROUND + 1) * (2 * AROUND + 1) - 1;
+
+impl View<'_> {
+    /// Indices of the pixels of the 5 × 5 around a pixel, without itself.
+    pub(super) fn around(&self, [x, y]: [usize; 2]) -> impl Iterator<Item = usize> {
+        let (width, own) = (self.width, y * self.width + x);
+        let columns = x.saturating_sub(AROUND)..(x + AROUND + 1).min(width);
+        let rows = y.saturating_sub(AROUND)..(y + AROUND + 1).min(self.height);
+        rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
+            .filter(move |other| *other != own)
+    }
+}
+
 /// Polynomial of a cluster in a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {

@@ -33,6 +33,7 @@ pub use components::SurfaceComponents;
 pub use error::{ReconstructionError, SquareError};
 pub use film::{FilmReconstruction, NotReconstructed};
 pub use first_surfaces::FirstSurfaces;
+pub(crate) use passes::for_pieces;
 pub use surfaces::{NO_CLUSTER, PixelSurfaces};
 pub use work::{FRACTIONS, Halves, Reconstructed, Reconstruction};
 

@@ -1,11 +1,11 @@
-//! Passes over slices in pieces: a pass of the executor, or a loop where it is over, since a reconstruction
-//! is short and needs all of its parts.
+//! Passes over slices in pieces: a pass of the executor, or a loop where it is over, since estimates
+//! are short and need all of their parts.
 
 use crate::method::{Executor, Worker};
 use crate::transport::Counters;
 
 /// Fills `out` by pieces of `length` values: `fill` gets the number of the piece and the piece.
-pub(super) fn for_pieces<T: Send>(
+pub(crate) fn for_pieces<T: Send>(
     executor: &mut impl Executor,
     out: &mut [T],
     length: usize,

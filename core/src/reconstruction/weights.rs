@@ -7,7 +7,7 @@
 
 use super::Both;
 use super::despike::median;
-use super::fit::View;
+use super::fit::{MOST_AROUND, View};
 use super::surfaces::NO_CLUSTER;
 use crate::estimate::RELMSE_OFFSET;
 
@@ -19,12 +19,6 @@ const AGREEMENT: f32 = 3.0;
 
 /// Largest ratio of a fit to the median of the neighbours.
 const MOST_RATIO: f32 = 3.0;
-
-/// Neighbours on each side.
-const RADIUS: usize = 2;
-
-/// Neighbours at most.
-const MOST: usize = (2 * RADIUS + 1) * (2 * RADIUS + 1) - 1;
 
 /// Mean of both halves by their parts of the samples.
 #[inline]
@@ -44,16 +38,11 @@ pub(super) fn weights(
     let own = y * view.width + x;
     let cluster = view.whole[own];
     let is_mixed = cluster == NO_CLUSTER;
-    let (mut around, mut count) = ([[0.0; MOST]; 3], 0);
-    for row in y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(view.height) {
-        for column in x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(view.width) {
-            let other = row * view.width + column;
-            if other != own && (is_mixed || view.whole[other] == cluster) {
-                let light = mean(&view.values[other], parts);
-                (0..3).for_each(|c| around[c][count] = light[c]);
-                count += 1;
-            }
-        }
+    let (mut around, mut count) = ([[0.0; MOST_AROUND]; 3], 0);
+    for other in view.around([x, y]).filter(|other| is_mixed || view.whole[*other] == cluster) {
+        let light = mean(&view.values[other], parts);
+        (0..3).for_each(|c| around[c][count] = light[c]);
+        count += 1;
     }
     let fitted = if is_mixed { fitted() } else { [0.0; 3] };
     let value = &view.values[own];

@@ -155,12 +155,13 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             }
             Until::Error(wanted) => self.render_until(wanted, executor)?,
         }
-        self.reconstruct(executor);
         let Self { audit, reconstruction, state, .. } = self;
-        if let Some(audit) = audit
+        if reconstruction.is_some() {
+            ErrorReport::new(state, reconstruction.as_mut(), audit.as_mut(), executor);
+        } else if let Some(audit) = audit
             && let Some(mean) = state.film.mean_radiance(executor)
         {
-            audit.compare(&state.film, reconstruction.as_ref(), mean, executor);
+            audit.compare(&state.film, None, mean, executor);
         }
         Ok(())
     }
@@ -196,22 +197,13 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         executor: &mut E,
     ) -> Result<ErrorReport, OutOfMemory> {
         self.step_audit(executor)?;
-        self.reconstruct(executor);
         let Self { method, state, audit, reconstruction, hidden, is_audit_open, .. } = self;
-        let reconstruction = reconstruction.as_ref();
-        let report = ErrorReport::new(state, reconstruction, audit.as_mut(), executor);
+        let report = ErrorReport::new(state, reconstruction.as_mut(), audit.as_mut(), executor);
         let report = report.lacking(hidden.as_ref(), &state.film);
         let Some(audit) = audit else { return Ok(report) };
         let time = ExtraTime { may_take: &mut |_| true, clock: &|| NO_CLOCK };
         let time = is_audit_open.then_some(time);
-        rounds.extend_audit((audit, method), (state, reconstruction, report), time, executor)
-    }
-
-    /// Reconstructs the picture, if that is wanted.
-    fn reconstruct(&mut self, executor: &mut impl Executor) {
-        if let Some(reconstruction) = &mut self.reconstruction {
-            reconstructing::update(reconstruction, &self.state, executor);
-        }
+        rounds.extend_audit((audit, method), (state, reconstruction.as_ref(), report), time, executor)
     }
 
     /// Takes the samples of the audit that are due.

@@ -5,15 +5,16 @@ mod value;
 
 pub use value::{PointIrradiance, PointSettings};
 
+use super::build::{Build, build_for, of_build};
 use super::{RenderError, RequiredMemory, Until};
-use crate::bsdf::{All, DiffuseTextured, Features, Opaque};
+use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::bvh::Bvh;
-use crate::census::{Census, FeatureSet};
 use crate::estimate::{POOLED_POINTS, half_width, point_variances};
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE};
 use crate::light::{LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::method::{Executor, IrradiancePoints, PilotSize, RenderContext, RenderMethod, RenderState, Round};
+use crate::method::{Executor, IrradiancePoints, PilotSize, RenderContext, RenderState, Round};
+use crate::reconstruction::for_pieces;
 use crate::scene::Scene;
 use crate::transport::{Counters, IrradiancePoint, PathSettings, UNLIMITED};
 use glam::Vec3;
@@ -23,7 +24,7 @@ use libm::{ceil, fmin, sqrt};
 /// Samples of a tile between two questions whether the executor is over.
 const STEP: u32 = 16;
 
-/// Samples at the first look at the intervals of a tile.
+/// Samples at which the intervals of a tile are first judged.
 const FIRST_DECISION: u32 = 64;
 
 /// Fraction of the points of a finished tile whose intervals are within the error.
@@ -41,26 +42,27 @@ const MOST_POINTS: usize = 1 << 30;
 /// Most samples of a point.
 const MOST_SAMPLES: u32 = 1 << 30;
 
+/// Builds of the path tracer of points.
+type Builds<'a> =
+    Build<IrradiancePoints<'a, DiffuseTextured>, IrradiancePoints<'a, Opaque>, IrradiancePoints<'a, All>>;
+
 /// Irradiance of many points in progress.
 pub struct IrradianceRenderer<'a> {
-    build: Build<'a>,
-}
-
-enum Build<'a> {
-    Diffuse(FeaturePoints<'a, DiffuseTextured>),
-    Opaque(FeaturePoints<'a, Opaque>),
-    All(FeaturePoints<'a, All>),
-}
-
-/// Runs `$work` on the build of a renderer.
-macro_rules! of_build {
-    ($build:expr, $renderer:ident => $work:expr) => {
-        match $build {
-            Build::Diffuse($renderer) => $work,
-            Build::Opaque($renderer) => $work,
-            Build::All($renderer) => $work,
-        }
-    };
+    build: Builds<'a>,
+    /// The points in the order of the film.
+    points: &'a [IrradiancePoint],
+    layout: Layout,
+    /// Place in the film of each replicate of each point.
+    places: &'a [u32],
+    state: RenderState<'a>,
+    /// Half-width of each pixel after the last step.
+    half_widths: &'a mut [f32],
+    /// 1 for each tile that has reached the error.
+    finished: &'a mut [u8],
+    /// Samples at which tiles are judged next.
+    decision: u32,
+    /// Error by which they were judged.
+    error: f64,
 }
 
 impl<'a> IrradianceRenderer<'a> {
@@ -69,7 +71,7 @@ impl<'a> IrradianceRenderer<'a> {
         let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let structures =
             Bvh::footprint(scene.mesh.triangles.len()).and(lights).and(Layout::of(points).footprint());
-        RequiredMemory { structures: structures.bytes(), scratch: IrradiancePoints::<All>::scratch().bytes() }
+        RequiredMemory { structures: structures.bytes(), scratch: Self::scratch().bytes() }
     }
 
     /// Builds the hierarchy and the lights of `scene`, whose camera is of no matter. Points that lie on a
@@ -85,9 +87,7 @@ impl<'a> IrradianceRenderer<'a> {
         arena: &mut Arena<'a>,
         executor: &mut impl Executor,
     ) -> Result<Self, RenderError> {
-        if !(1..=MOST_POINTS).contains(&points.len()) {
-            return Err(RenderError::Points);
-        }
+        check_number(points)?;
         scene.mesh.validate(scene.materials.len()).map_err(RenderError::Triangle)?;
         let needed = Self::required_memory(scene, points.len()).structures;
         if arena.available() < needed {
@@ -96,6 +96,12 @@ impl<'a> IrradianceRenderer<'a> {
         let bvh = Bvh::build_with(&scene.mesh, arena, settings.level, executor.fork())?;
         let lights = LightSampler::build(scene, arena)?.with_level(settings.level);
         Self::over((scene, bvh, lights), points, settings, arena, executor)
+    }
+
+    /// Working memory of a worker.
+    #[doc(hidden)]
+    pub fn scratch() -> Footprint {
+        IrradiancePoints::<All>::scratch()
     }
 
     /// Memory of the points alone, beside structures of the scene that exist.
@@ -117,6 +123,7 @@ impl<'a> IrradianceRenderer<'a> {
         arena: &mut Arena<'a>,
         executor: &mut impl Executor,
     ) -> Result<Self, RenderError> {
+        check_number(points)?;
         let PointSettings { seed, level, shard, .. } = *settings;
         let layout = Layout::of(points.len());
         if shard.index >= shard.count || shard.count as usize > layout.tiles() {
@@ -126,16 +133,33 @@ impl<'a> IrradianceRenderer<'a> {
         let max_depth = settings.max_depth.unwrap_or(UNLIMITED);
         let paths = PathSettings { width, height, seed, max_depth };
         let context = RenderContext { scene, bvh, lights, settings: paths, level, pilots: PilotSize::USUAL };
-        let build = match Census::of(scene).plan().features {
-            FeatureSet::Diffuse => {
-                Build::Diffuse(FeaturePoints::new(&context, (points, settings), arena, executor)?)
+        let state = RenderState::new(width, height, shard, arena)?;
+        let pixels = layout.pixels();
+        let (ordered, keys) = (arena.slice::<IrradiancePoint>(pixels)?, arena.slice::<u64>(pixels)?);
+        let (places, half_widths) = (arena.slice::<u32>(pixels)?, arena.slice::<f32>(pixels)?);
+        let finished = arena.slice::<u8>(layout.tiles())?;
+        half_widths.fill(f32::INFINITY);
+        finished.fill(0);
+        order_along_curve(points, layout.replicates, keys);
+        for (place, key) in keys.iter().enumerate() {
+            if let Some(slot) = places.get_mut(number_of(*key)) {
+                *slot = place as u32;
             }
-            FeatureSet::Opaque => {
-                Build::Opaque(FeaturePoints::new(&context, (points, settings), arena, executor)?)
+        }
+        let (of_scene, keys) = (context.scene_context::<All>(), &*keys);
+        let passed = executor.pass(ordered.chunks_mut(CHUNK), |chunk, pieces, _| {
+            for (point, key) in pieces.iter_mut().zip(&keys[chunk * CHUNK..]) {
+                let number = number_of(*key);
+                let Some(given) = points.get(number / layout.replicates) else { continue };
+                *point = given.numbered(number as u32).settled(&of_scene);
             }
-            FeatureSet::All => Build::All(FeaturePoints::new(&context, (points, settings), arena, executor)?),
-        };
-        Ok(Self { build })
+            Ok(Counters::default())
+        })?;
+        // Without positions nothing can be sampled: the film stays empty.
+        let points = if passed.is_complete { &*ordered } else { &[] };
+        let build = build_for!(scene, IrradiancePoints::new(&context, points, settings.light));
+        let (decision, error) = (FIRST_DECISION, 0.0);
+        Ok(Self { build, points, layout, places, state, half_widths, finished, decision, error })
     }
 
     /// Adds samples to each point `until` the given end, or until the executor is over. By an error, tiles of
@@ -145,7 +169,14 @@ impl<'a> IrradianceRenderer<'a> {
     /// # Errors
     /// [`RenderError::Memory`] where the scratch of `executor` is too small.
     pub fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
-        of_build!(&mut self.build, renderer => renderer.step(executor, until))
+        match until {
+            Until::Samples(target) => {
+                self.sample(executor, target, |_, _| true)?;
+                self.estimate(executor);
+                Ok(())
+            }
+            Until::Error(error) => self.step_within(executor, error, MOST_SAMPLES),
+        }
     }
 
     /// As [`Until::Error`], with at most so many samples of each point.
@@ -158,165 +189,84 @@ impl<'a> IrradianceRenderer<'a> {
         error: f64,
         most: u32,
     ) -> Result<(), RenderError> {
-        of_build!(&mut self.build, renderer => {
-            renderer.sample_within((error, most), executor)?;
-            Ok(renderer.estimate(executor)?)
-        })
+        self.sample_within((error, most), executor)?;
+        self.estimate(executor);
+        Ok(())
     }
 
     /// Irradiance of each point, in the order of the points.
     pub fn values(&self) -> impl Iterator<Item = PointIrradiance> + '_ {
-        let Parts { layout, places, state, half_widths, .. } = self.parts();
+        let Self { layout, places, state, half_widths, .. } = self;
         let each = places.chunks(layout.replicates);
         each.map(move |places| PointIrradiance::of_replicates(places, state.film.pixels(), half_widths))
     }
 
     /// Samples of the least sampled point.
     pub fn samples(&self) -> u32 {
-        self.parts().state.spp()
+        self.state.spp()
     }
 
     /// Number of tiles of near points, and of those that have reached the error of the last step.
     pub fn tiles(&self) -> [usize; 2] {
-        let Parts { finished, state, .. } = self.parts();
-        [state.tiles(), finished.iter().filter(|finished| **finished != 0).count()]
+        [self.state.tiles(), self.finished.iter().filter(|finished| **finished != 0).count()]
     }
 
     /// Sums of the samples. Pixels are points along a Z-curve.
     pub fn state(&self) -> &RenderState<'a> {
-        &self.parts().state
+        &self.state
     }
 
     /// Rays and rejected samples so far.
     pub fn counters(&self) -> Counters {
-        self.parts().state.counters
+        self.state.counters
     }
 
-    fn parts(&self) -> &Parts<'a> {
-        of_build!(&self.build, renderer => &renderer.parts)
-    }
-}
-
-/// Film and intervals of the points.
-struct Parts<'a> {
-    layout: Layout,
-    /// Place in the film of each replicate of each point.
-    places: &'a [u32],
-    state: RenderState<'a>,
-    /// Half-width of each pixel after the last step.
-    half_widths: &'a mut [f32],
-    /// 1 for each tile that has reached the error.
-    finished: &'a mut [u8],
-    /// Samples at which tiles are judged next.
-    decision: u32,
-    /// Error by which they were judged.
-    error: f64,
-}
-
-struct FeaturePoints<'a, F> {
-    method: IrradiancePoints<'a, F>,
-    parts: Parts<'a>,
-}
-
-impl<'a, F: Features> FeaturePoints<'a, F> {
-    fn new(
-        context: &RenderContext<'a>,
-        (points, settings): (&[IrradiancePoint], &PointSettings),
-        arena: &mut Arena<'a>,
-        executor: &mut impl Executor,
-    ) -> Result<Self, RenderError> {
-        let layout = Layout::of(points.len());
-        let state = RenderState::new(TILE, TILE * layout.tiles() as u32, settings.shard, arena)?;
-        let pixels = layout.pixels();
-        let (ordered, keys) = (arena.slice::<IrradiancePoint>(pixels)?, arena.slice::<u64>(pixels)?);
-        let (places, half_widths) = (arena.slice::<u32>(pixels)?, arena.slice::<f32>(pixels)?);
-        let finished = arena.slice::<u8>(layout.tiles())?;
-        order_along_curve(points, layout.replicates, keys);
-        for (place, key) in keys.iter().enumerate() {
-            if let Some(slot) = places.get_mut(number_of(*key)) {
-                *slot = place as u32;
-            }
-        }
-        let scene = context.scene_context::<F>();
-        let (keys, pieces) = (&*keys, ordered.chunks_mut(CHUNK));
-        let passed = executor.pass(pieces, |chunk, pieces, _| {
-            for (point, key) in pieces.iter_mut().zip(&keys[chunk * CHUNK..]) {
-                let number = number_of(*key);
-                let Some(given) = points.get(number / layout.replicates) else { continue };
-                *point = given.numbered(number as u32).settled(&scene);
-            }
-            Ok(Counters::default())
-        })?;
-        if !passed.is_complete {
-            // Without positions nothing can be sampled: the film stays empty.
-            ordered.fill(IrradiancePoint::default());
-        }
-        half_widths.fill(f32::INFINITY);
-        finished.fill(u8::from(!passed.is_complete));
-        let method = IrradiancePoints::new(context, ordered, settings.light);
-        Ok(Self {
-            method,
-            parts: Parts {
-                layout,
-                places,
-                state,
-                half_widths,
-                finished,
-                decision: FIRST_DECISION,
-                error: 0.0,
-            },
-        })
-    }
-
-    fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
-        match until {
-            Until::Samples(target) => self.sample(executor, target)?,
-            Until::Error(error) => self.sample_within((error, MOST_SAMPLES), executor)?,
-        }
-        self.estimate(executor)?;
-        Ok(())
-    }
-
-    /// Brings each tile to `target` samples.
-    fn sample<E: Executor>(&mut self, executor: &mut E, target: u32) -> Result<(), OutOfMemory> {
-        let round = &mut Round { executor, state: &mut self.parts.state, target, step: STEP };
-        self.method.round(round)
+    /// Brings the tiles that are open to `target` samples.
+    fn sample<E: Executor>(
+        &mut self,
+        executor: &mut E,
+        target: u32,
+        is_open: impl Fn(&[u8], usize) -> bool + Send + Sync,
+    ) -> Result<(), OutOfMemory> {
+        let Self { build, state, finished, .. } = self;
+        let finished = &**finished;
+        let round = &mut Round { executor, state, target, step: STEP };
+        of_build!(build, method => method.sample(round, |tile| is_open(finished, tile)))
     }
 
     /// Adds samples to the tiles that have not reached `error`, until all have or have `most` samples. Tiles
     /// are judged at numbers of samples of their own, so that the steps are of no matter.
-    fn sample_within<E: Executor>(
+    fn sample_within(
         &mut self,
         (error, most): (f64, u32),
-        executor: &mut E,
+        executor: &mut impl Executor,
     ) -> Result<(), OutOfMemory> {
-        self.parts.aim_at(error);
-        while !executor.is_over() && self.parts.has_open_tiles() {
-            let Parts { state, finished, decision, .. } = &mut self.parts;
-            let (finished, target, is_decision) = (&**finished, most.min(*decision), *decision <= most);
-            let is_finished = |tile: usize| finished.get(tile).is_none_or(|finished| *finished != 0);
-            let round = &mut Round { executor: &mut *executor, state, target, step: STEP };
-            self.method.sample_unfinished(round, is_finished)?;
+        self.aim_at(error);
+        let is_open = |finished: &[u8], tile: usize| finished.get(tile) == Some(&0);
+        while !executor.is_over() && self.has_open_tiles() {
+            let (target, is_decision) = (most.min(self.decision), self.decision <= most);
+            self.sample(executor, target, is_open)?;
             if executor.is_over() || !is_decision {
                 return Ok(());
             }
-            self.estimate(executor)?;
-            self.parts.finish_tiles(error as f32);
-            self.parts.decision = next_decision(target);
+            self.estimate(executor);
+            self.finish_tiles(error as f32);
+            if target == MOST_SAMPLES {
+                return Ok(());
+            }
+            self.decision = next_decision(target);
         }
         Ok(())
     }
 
     /// Half-widths of all points.
-    fn estimate(&mut self, executor: &mut impl Executor) -> Result<(), OutOfMemory> {
-        let (points, Parts { state, half_widths, layout, .. }) = (self.method.points(), &mut self.parts);
-        let pixels = state.film.pixels();
-        let total = layout.pixels();
+    fn estimate(&mut self, executor: &mut impl Executor) {
+        let (points, total, pixels) = (self.points, self.layout.pixels(), self.state.film.pixels());
         let place = |i: usize| {
             let point = points.get(i).copied().unwrap_or_default();
             (Vec3::from(point.position), Vec3::from(point.normal))
         };
-        let _ = executor.pass(half_widths.chunks_mut(POOLED_POINTS), |block, out, _| {
+        for_pieces(executor, self.half_widths, POOLED_POINTS, |block, out| {
             // The last block is a whole one as well.
             let end = ((block + 1) * POOLED_POINTS).min(total);
             let start = end.saturating_sub(POOLED_POINTS);
@@ -326,18 +276,9 @@ impl<'a, F: Features> FeaturePoints<'a, F> {
             for (half, variance) in out.iter_mut().zip(variances.iter().skip(skipped)) {
                 *half = half_width(*variance);
             }
-            Ok(Counters::default())
-        })?;
-        Ok(())
+        });
     }
-}
 
-/// Samples at which tiles are judged after `samples`.
-fn next_decision(samples: u32) -> u32 {
-    fmin(ceil(f64::from(samples) * sqrt(2.0)), f64::from(MOST_SAMPLES)) as u32
-}
-
-impl Parts<'_> {
     /// Opens all tiles where `error` is another than before.
     fn aim_at(&mut self, error: f64) {
         if self.error != error {
@@ -375,6 +316,20 @@ impl Parts<'_> {
             *finished |= u8::from(within as f64 >= WITHIN * pixels.len() as f64);
         }
     }
+}
+
+/// # Errors
+/// [`RenderError::Points`] where there is no point, or there are too many.
+fn check_number(points: &[IrradiancePoint]) -> Result<(), RenderError> {
+    match (1..=MOST_POINTS).contains(&points.len()) {
+        true => Ok(()),
+        false => Err(RenderError::Points),
+    }
+}
+
+/// Samples at which tiles are judged after `samples`.
+fn next_decision(samples: u32) -> u32 {
+    fmin(ceil(f64::from(samples) * sqrt(2.0)), f64::from(MOST_SAMPLES)) as u32
 }
 
 #[cfg(test)]

@@ -2,9 +2,8 @@
 
 use super::{Reconstruct, RenderError, Settings};
 use crate::bsdf::Features;
-use crate::estimate::ErrorEstimate;
 use crate::memory::{Arena, Footprint};
-use crate::method::{Executor, RenderContext, RenderState};
+use crate::method::{Executor, RenderContext};
 use crate::reconstruction::{FilmReconstruction, FirstSurfaces};
 use crate::scene::Scene;
 
@@ -35,16 +34,4 @@ pub(super) fn set_up<'a, F: Features>(
         Reconstruct::Auto => Ok(FilmReconstruction::of_view::<F>(context, arena, executor)?),
         Reconstruct::Off => Ok(None),
     }
-}
-
-/// Reconstructs the film of `state`.
-pub(super) fn update(
-    reconstruction: &mut FilmReconstruction,
-    state: &RenderState,
-    executor: &mut impl Executor,
-) {
-    let RenderState { film, is_correlated, .. } = state;
-    let mean = film.mean_radiance(executor);
-    let raw = mean.and_then(|mean| ErrorEstimate::of_film(film, mean, *is_correlated, executor));
-    reconstruction.update(film, raw, executor);
 }

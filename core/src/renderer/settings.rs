@@ -91,7 +91,7 @@ impl Settings {
 /// Reconstruction of the picture from the two halves of its film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reconstruct {
-    /// Where the film allows it. The film itself keeps the sums of the samples.
+    /// If the film allows it. The film itself keeps the sums of the samples.
     Auto,
     /// The picture is the mean of the samples.
     #[default]

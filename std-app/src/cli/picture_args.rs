@@ -277,7 +277,7 @@ enum When {
 /// Use of the reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Reconstruction {
-    /// Where its estimated error is smaller than that of the samples
+    /// If its estimated error is smaller than that of the samples
     Auto,
     /// Never
     Off,

@@ -30,7 +30,7 @@ pub enum RenderError {
 }
 
 impl RenderError {
-    /// What to do; empty if the problem says it.
+    /// Advice; empty if the problem says it.
     pub fn help(&self) -> &'static str {
         match self {
             Self::Memory { .. } => "raise the memory limit, or render fewer pixels",

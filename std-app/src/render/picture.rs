@@ -11,7 +11,7 @@ use super::reconstruction;
 use super::rejected_tiles::{self, empty_pixels};
 use super::setup::RenderSetup;
 use super::survey::Survey;
-use super::threads::{RoundLimits, ThreadedRound};
+use super::threads::{RoundLimits, ThreadedRound, Threads};
 use super::{Ending, ErrorEstimate, Method, Progress, RenderError, RenderResult, Seconds};
 use crate::save::Patience;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -266,8 +266,8 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
     fn judge(&mut self) -> ErrorReport {
         let Picture { setup, state, audit, reconstruction, hidden, .. } = &mut self.picture;
         let audit = audit.as_mut().map(|audit| &mut audit.audit);
-        let report = reconstruction::judge(reconstruction, state, audit, setup.workers);
-        report.lacking(hidden.as_ref(), &state.film)
+        let new = |executor: &mut Threads| ErrorReport::new(state, reconstruction.as_mut(), audit, executor);
+        setup.workers.estimating(new).lacking(hidden.as_ref(), &state.film)
     }
 
     /// Writes the film file, during the render or at the end with patience `last`.

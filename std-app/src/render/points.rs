@@ -6,7 +6,6 @@ use super::memory::{Bank, Memory};
 use super::threads::{Pool, Threads, Workers};
 use super::{RenderError, Stop};
 use core::sync::atomic::AtomicBool;
-use core::time::Duration;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::Counters;
@@ -121,17 +120,9 @@ pub(crate) fn with_points(
     let given = Footprint::default().slice::<IrradiancePoint>(points.len());
     memory.set_aside("given points", given)?;
     let mut lines = memory.take("points", IrradianceRenderer::footprint(points.len()))?;
-    let each = IrradianceRenderer::required_memory(scene, points.len()).scratch.div_ceil(64);
-    let mut scratch = Vec::new();
-    for _ in 0..Workers::new(pool).count() {
-        scratch.push(memory.take("working memory", Footprint::default().slice::<[u8; 64]>(each))?);
-    }
-    let workers = Workers::new(pool).ending_at(Deadline::until(interrupt));
-    let end = |stop: &Stop| {
-        let limit = stop.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-        limit.and_then(|limit| start.checked_add(limit))
-    };
-    let deadline = end(&settings.stop);
+    let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(settings.stop.seconds));
+    let deadline = workers.deadline.after(1.0);
+    let mut scratch = memory.take_each("working memory", IrradianceRenderer::scratch(), workers.count())?;
     let mut executor = Threads::new(&workers, &mut scratch).until(End::FirstRound(None));
     let core = PointSettings {
         seed: settings.seed,
@@ -150,8 +141,8 @@ pub(crate) fn with_points(
     loop {
         let most = settings.stop.most_samples();
         target = most.map_or(target, |most| target.min(most));
-        // Every point has samples, whatever the time.
-        let end = if is_first { End::FirstRound(deadline) } else { End::Round(deadline) };
+        // Every point has samples, some seconds after the end as well.
+        let end = if is_first { End::FirstRound(None) } else { End::Round(deadline) };
         let mut executor = Threads::new(&workers, &mut scratch).until(end);
         let round = Instant::now();
         match settings.stop.error {

@@ -3,12 +3,9 @@
 use super::RenderError;
 use super::memory::Memory;
 use super::setup::RenderSetup;
-use super::threads::{Threads, Workers};
-use halflight_core::audit::{Audit, ErrorReport};
+use super::threads::Threads;
 use halflight_core::bsdf::Features;
-use halflight_core::estimate::ErrorEstimate;
 use halflight_core::memory::MemorySource;
-use halflight_core::method::RenderState;
 use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces};
 use halflight_core::renderer::Reconstruct;
 
@@ -28,24 +25,6 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
     let mut scratch = memory.take_each("surfaces", FirstSurfaces::<F>::scratch(), workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);
     Ok(FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?)
-}
-
-/// Reconstructs the film of `state`, if that is wanted, and estimates its error with its `audit`.
-pub(super) fn judge<F: Features>(
-    reconstruction: &mut Option<FilmReconstruction>,
-    state: &RenderState,
-    audit: Option<&mut Audit<F>>,
-    workers: &Workers,
-) -> ErrorReport {
-    workers.estimating(|executor| {
-        if let Some(reconstruction) = reconstruction.as_mut() {
-            let RenderState { film, is_correlated, .. } = state;
-            let mean = film.mean_radiance(executor);
-            let raw = mean.and_then(|mean| ErrorEstimate::of_film(film, mean, *is_correlated, executor));
-            reconstruction.update(film, raw, executor);
-        }
-        ErrorReport::new(state, reconstruction.as_ref(), audit, executor)
-    })
 }
 
 /// The reconstructed picture, row by row, if there is one.
