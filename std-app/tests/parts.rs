@@ -83,6 +83,8 @@ fn shards_merge_to_the_bits_of_one_render() {
     }
     let merged = folder.object("merge 3.film 1.film 2.film -o merged.exr --json");
     assert_eq!(read(&folder.path("whole.exr")).unwrap(), read(&folder.path("merged.exr")).unwrap());
+    assert_eq!(merged["findings"]["reconstruction"]["decision"], "used");
+    assert_eq!(merged["findings"]["reconstruction"], whole["findings"]["reconstruction"]);
     for key in ["spp", "rays", "shadow_rays", "paths", "mean_radiance", "error"] {
         assert_eq!(whole[key], merged[key], "{key}");
     }

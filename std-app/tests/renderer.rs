@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 use halflight::Renderer;
 use halflight::load::{LoadOptions, PartMesh, SceneParts, View, load};
-use halflight::render::{self, Ending, Method, RenderResult, Settings, Stop};
+use halflight::render::{self, Ending, Method, Reconstruct, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
 use halflight_core::scene::{Material, PointLight};
 
@@ -68,7 +68,7 @@ fn the_last_picture_of_the_progress_is_the_result_and_a_flag_ends_the_render() {
     let camera = renderer.scene().camera_or_default();
     let result = renderer.render_with(
         camera,
-        &settings(Method::Path, 1 << 20),
+        &Settings { reconstruct: Reconstruct::Off, ..settings(Method::Path, 1 << 20) },
         &mut |progress| {
             last = progress.picture();
             stop.store(progress.spp >= 8, Ordering::Relaxed);

@@ -12,6 +12,7 @@ use halflight::load::{self, LoadOptions};
 use halflight::render::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
 use halflight::save::Image;
 use halflight_core::estimate::relmse;
+use halflight_tests::render::raw;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -173,7 +174,7 @@ fn mean(one: &Image, other: &Image) -> (Image, f64) {
 
 fn settings(wanted: &Wanted, seed: u32, stop: Stop) -> Settings {
     let Wanted { size, method, audit, .. } = *wanted;
-    Settings { width: size, height: size, seed, stop, method, audit, ..Settings::default() }
+    Settings { width: size, height: size, seed, stop, method, audit, ..raw() }
 }
 
 /// One line of the table: true errors and their estimates.

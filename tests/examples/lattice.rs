@@ -13,6 +13,7 @@
 use core::sync::atomic::AtomicBool;
 use halflight::load::{self, LoadOptions};
 use halflight::render::{Progress, Settings, Stop, render};
+use halflight_tests::render::raw;
 use std::path::Path;
 
 /// Pixels along a block.
@@ -58,7 +59,7 @@ fn main() {
                         threads: Some(1),
                         reuse: Some(reuse),
                         caustics: false,
-                        ..Settings::default()
+                        ..raw()
                     };
                     // Of rendering alone, from the first sample on.
                     let mut before = None;

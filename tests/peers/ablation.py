@@ -114,7 +114,7 @@ def run(scene, flags, without="", threads=1):
     """The picture, the facts of `--json`, and the processor seconds of one render."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.pfm"
-        command = [PROGRAM, "render", str(scene), "--size", SIZE, "--json", "--threads", str(threads)]
+        command = [PROGRAM, "render", "--reconstruct", "off", str(scene), "--size", SIZE, "--json", "--threads", str(threads)]
         environment = {**os.environ, "HALFLIGHT_WITHOUT": without}
         child = subprocess.Popen(
             command + ["-o", str(picture)] + flags, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment

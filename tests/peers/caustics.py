@@ -84,7 +84,7 @@ def ours(program, scene, extra, seed, spp):
     """The picture and its seconds, those of loading and building included."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.exr"
-        command = [program, "render", str(scene), "-o", str(picture), "--seed", str(seed), "--json"]
+        command = [program, "render", "--reconstruct", "off", str(scene), "-o", str(picture), "--seed", str(seed), "--json"]
         command += ["--threads", str(workbench.THREADS), "--spp", str(spp), *extra]
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         done = subprocess.run(command, capture_output=True, text=True)

@@ -23,7 +23,7 @@ SIGNIFICANCE = 0.01
 
 def render(program, scene, method, spp, seed, size, folder, reference=None):
     picture = Path(folder) / f"{method}-{seed}.exr"
-    command = [program, "render", scene, "-o", picture, "--method", method, "--spp", spp, "--seed", seed]
+    command = [program, "render", "--reconstruct", "off", scene, "-o", picture, "--method", method, "--spp", spp, "--seed", seed]
     command += ["--size", f"{size}x{size}", "--threads", THREADS, "--audit", "off", "--json"]
     if reference:
         command += ["--reference", reference]

@@ -35,7 +35,7 @@ SIDE = 192
 
 
 def render(scene, *flags):
-    command = [PROGRAM, "render", str(ROOT / scene), "--size", f"{SIDE}x{SIDE}", *map(str, flags)]
+    command = [PROGRAM, "render", "--reconstruct", "off", str(ROOT / scene), "--size", f"{SIDE}x{SIDE}", *map(str, flags)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode not in (0, 3):
         raise RuntimeError(f"{command}: {done.stderr}")

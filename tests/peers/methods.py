@@ -68,7 +68,7 @@ def render(scene, flags, threads=1):
     """The picture and the facts of `--json` of one render."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.pfm"
-        command = [PROGRAM, "render", str(scene), "--size", "{}x{}".format(*SIZE), "--json", "-o", str(picture)]
+        command = [PROGRAM, "render", "--reconstruct", "off", str(scene), "--size", "{}x{}".format(*SIZE), "--json", "-o", str(picture)]
         done = subprocess.run(command + ["--threads", str(threads)] + flags, capture_output=True, text=True)
         if done.returncode not in (0, 3):
             raise RuntimeError(f"{command} {flags}: {done.stderr}")

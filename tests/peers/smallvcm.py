@@ -156,7 +156,7 @@ def theirs(index, algorithm, seconds, seed, folder):
 def ours(description, method, spp, seed, folder):
     """Our picture, its seconds, and the method that rendered it."""
     picture = folder / "ours.pfm"
-    command = [PROGRAM, "render", str(description), "-o", str(picture), "--spp", str(spp)]
+    command = [PROGRAM, "render", "--reconstruct", "off", str(description), "-o", str(picture), "--spp", str(spp)]
     command += ["--method", *method.split()]
     # Without an audit `auto` has no cache.
     command += [] if method == "auto" else ["--audit", "off"]

@@ -72,7 +72,7 @@ def halflight(program, scene, spp, seed, size=None, extra=()):
     """Renders `scene` (a path) with our path tracer: the picture (height, width, 3) and the `--json` object."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.exr"
-        command = [program, "render", str(scene), "-o", str(picture), "--method", "path", "--spp", str(spp)]
+        command = [program, "render", "--reconstruct", "off", str(scene), "-o", str(picture), "--method", "path", "--spp", str(spp)]
         command += ["--seed", str(seed), "--threads", str(THREADS), "--json"]
         if size:
             command += ["--size", f"{size[0]}x{size[1]}"]

@@ -2,11 +2,18 @@
 
 use crate::statistics;
 use core::sync::atomic::AtomicBool;
-use halflight::render::{self, BidirectionalSettings, Method, RenderError, RenderResult, Settings, Stop};
+use halflight::render::{
+    self, BidirectionalSettings, Method, Reconstruct, RenderError, RenderResult, Settings, Stop,
+};
 use halflight::save::Image;
 use halflight_core::findings::Finding;
 use halflight_core::method::caustics;
 use halflight_core::scene::Scene;
+
+/// Settings of pictures whose pixels are the means of their samples.
+pub fn raw() -> Settings {
+    Settings { reconstruct: Reconstruct::Off, ..Settings::default() }
+}
 
 /// A square picture of `size` pixels across with `spp` samples, not audited; `change` edits the settings
 /// last.
@@ -33,7 +40,7 @@ pub fn try_render(
 ) -> Result<RenderResult, RenderError> {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let (method, audit) = (Some(method), Some(0.0));
-    let mut settings = Settings { method, width: size, height: size, stop, audit, ..Settings::default() };
+    let mut settings = Settings { method, width: size, height: size, stop, audit, ..raw() };
     change(&mut settings);
     if settings.bidirectional == BidirectionalSettings::default() {
         settings.bidirectional = all_techniques(scene, &settings);

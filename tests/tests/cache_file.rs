@@ -5,7 +5,7 @@ use core::sync::atomic::AtomicBool;
 use glam::Vec3;
 use halflight::render::{self, Method, RenderResult, Settings, Stop};
 use halflight_core::scene::Camera;
-use halflight_tests::render::number;
+use halflight_tests::render::{number, raw};
 use halflight_tests::scenes::{SceneBuffers, cornell_box};
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ fn render(
 ) -> Result<RenderResult, String> {
     let stop = Stop { spp: Some(4), ..Stop::default() };
     let method = Some(Method::IrradianceCache);
-    let mut settings = Settings { method, width: 64, height: 64, stop, ..Settings::default() };
+    let mut settings = Settings { method, width: 64, height: 64, stop, ..raw() };
     settings.cache.strata = Some(16);
     settings.load_cache = load.map(Path::to_owned);
     settings.save_cache = save.map(Path::to_owned);

@@ -11,7 +11,7 @@ use halflight_core::Rgb;
 use halflight_core::findings::Value;
 use halflight_core::scene::{Camera, Material};
 use halflight_simd::Level;
-use halflight_tests::render::{number, render};
+use halflight_tests::render::{number, raw, render};
 use halflight_tests::scenes::{SceneBuffers, box_from_above, emitter, metal};
 use halflight_tests::snapshot;
 
@@ -176,7 +176,7 @@ fn choices() -> String {
                     max_depth,
                     level: Level::BASELINE,
                     stop: Stop { spp: Some(spp), ..Stop::default() },
-                    ..Settings::default()
+                    ..raw()
                 };
                 let result = render::render(scene, &settings, &mut stop_render, &stopped).expect("a picture");
                 text += &format!("{:>5} spp {:<16}", spp, result.method.name());

@@ -7,6 +7,7 @@ use glam::Vec3;
 use halflight::render::{self, Method, RenderResult, Settings, Stop};
 use halflight_core::findings::Decision;
 use halflight_core::scene::{Camera, Material, Scene};
+use halflight_tests::render::raw;
 use halflight_tests::scenes::{SceneBuffers, constant_environment};
 use halflight_tests::statistics::{agree, blocks};
 
@@ -27,14 +28,8 @@ fn with_constant(mut scene: SceneBuffers) -> SceneBuffers {
 
 fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let mut settings = Settings {
-        method: Some(Method::Path),
-        width: SIZE,
-        height: SIZE,
-        stop,
-        reuse: Some(false),
-        ..Settings::default()
-    };
+    let mut settings =
+        Settings { method: Some(Method::Path), width: SIZE, height: SIZE, stop, reuse: Some(false), ..raw() };
     change(&mut settings);
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }

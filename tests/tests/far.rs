@@ -6,6 +6,7 @@ use core::fmt::Write;
 use core::sync::atomic::AtomicBool;
 use halflight::load::LoadedScene;
 use halflight::render::{Settings, Stop, render};
+use halflight_tests::render::raw;
 
 const MTL: &[u8] = b"newmtl a\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 3 3 3\n";
 
@@ -67,12 +68,8 @@ fn load(faces: &Faces, placed: &str, camera: &str, light: &str) -> LoadedScene {
 fn picture(faces: &Faces, placed: &str, camera: &str, light: &str) -> Vec<f64> {
     let loaded = load(faces, placed, camera, light);
     assert_eq!(loaded.repairs, [""; 0]);
-    let settings = Settings {
-        width: 32,
-        height: 32,
-        stop: Stop { spp: Some(256), ..Stop::default() },
-        ..Settings::default()
-    };
+    let settings =
+        Settings { width: 32, height: 32, stop: Stop { spp: Some(256), ..Stop::default() }, ..raw() };
     let views = loaded.views();
     let scene = views.scene(loaded.camera_or_default());
     let result = render(&scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap();

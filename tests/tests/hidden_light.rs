@@ -6,6 +6,7 @@ use glam::Vec3;
 use halflight::render::{BidirectionalSettings, Method, PrimarySpace, RenderResult, Settings, Stop, render};
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, PointLight};
+use halflight_tests::render::raw;
 use halflight_tests::scenes::{SceneBuffers, glass};
 
 const SIZE: u32 = 48;
@@ -61,7 +62,7 @@ fn picture(
 ) -> RenderResult {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let (method, audit) = (Some(method), Some(0.0));
-    let mut settings = Settings { method, width: SIZE, height: SIZE, stop, audit, ..Settings::default() };
+    let mut settings = Settings { method, width: SIZE, height: SIZE, stop, audit, ..raw() };
     change(&mut settings);
     render(&buffers.scene(), &settings, &mut |_| (), &false.into()).unwrap()
 }

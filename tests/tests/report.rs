@@ -9,6 +9,7 @@ use halflight::render::{Method, RejectedTile, RenderResult, Settings, Stop, rend
 use halflight::report::{Provenance, Race, RaceEntry, Run};
 use halflight::save::to_srgb;
 use halflight_core::film::Dropped;
+use halflight_tests::render::raw;
 use std::sync::Arc;
 
 /// A scene name that shows in the console unless it is escaped.
@@ -44,7 +45,7 @@ fn picture(loaded: &LoadedScene, settings: &Settings) -> RenderResult {
 fn settings(loaded: &LoadedScene, seed: u32) -> Settings {
     let stop = |spp| Stop { spp: Some(spp), ..Stop::default() };
     let (method, stop_at) = (Some(Method::Path), stop(64));
-    let base = Settings { method, width: SIZE, height: SIZE, seed, stop: stop_at, ..Settings::default() };
+    let base = Settings { method, width: SIZE, height: SIZE, seed, stop: stop_at, ..raw() };
     let reference = picture(loaded, &Settings { seed: seed + 9, stop: stop(256), ..base.clone() }).image;
     Settings { reference: Some(Arc::new(reference)), ..base }
 }

@@ -10,7 +10,7 @@ use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::{PathIntegrator, PathReuse, PathSettings, UNLIMITED};
 use halflight_core::{Level, Rgb};
 use halflight_tests::memory::{TestArena, with_structures};
-use halflight_tests::render::{finding, number};
+use halflight_tests::render::{finding, number, raw};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 use halflight_tests::statistics::{agree, blocks};
 
@@ -30,7 +30,7 @@ const WIDEST: f64 = 6.2;
 fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let (method, size) = (Some(Method::Path), SIZE);
-    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
+    let mut settings = Settings { method, width: size, height: size, stop, ..raw() };
     change(&mut settings);
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }

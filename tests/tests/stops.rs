@@ -8,6 +8,7 @@ use glam::Vec3;
 use halflight::render::{self, Ending, Method, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material};
+use halflight_tests::render::raw;
 use halflight_tests::scenes::{SceneBuffers, emitter};
 use halflight_tests::statistics::judge;
 use std::time::Instant;
@@ -58,7 +59,7 @@ fn a_picture_that_ends_before_its_first_sample_is_whole() {
     for method in [Method::Path, Method::IrradianceCache] {
         let stop = Stop { spp: Some(64), ..Stop::default() };
         let (width, height, threads, method) = (2560, 2560, Some(1), Some(method));
-        let settings = Settings { width, height, threads, method, stop, ..Settings::default() };
+        let settings = Settings { width, height, threads, method, stop, ..raw() };
         let start = Instant::now();
         let result =
             render::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
@@ -73,7 +74,7 @@ fn a_picture_that_ends_before_its_first_sample_is_whole() {
 fn an_audit_that_finds_no_light_reports_no_bias() {
     for method in [Method::ProgressivePhotons, Method::PhotonMap] {
         let stop = Stop { spp: Some(512), error: Some(0.02), ..Stop::default() };
-        let settings = Settings { method: Some(method), width: 32, height: 32, stop, ..Settings::default() };
+        let settings = Settings { method: Some(method), width: 32, height: 32, stop, ..raw() };
         let flag = AtomicBool::new(false);
         let result = render::render(&glass_cube(false).scene(), &settings, &mut |_| (), &flag).unwrap();
         let (audit, error) = (result.audit.unwrap(), result.error.unwrap());

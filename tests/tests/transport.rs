@@ -20,6 +20,7 @@ use halflight_core::transport::{
     Counters, IrradiancePoint, LightPart, PathIntegrator, PathSettings, UNLIMITED,
 };
 use halflight_tests::memory::{TestArena, with_structures};
+use halflight_tests::render::raw;
 use halflight_tests::scenes::{
     SceneBuffers, constant_environment, cornell_box, emitter, everything, room_with_lamp,
 };
@@ -30,7 +31,7 @@ const CORNELL_MEAN: [f64; 3] = [0.2123, 0.1509, 0.0652];
 fn render(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let method = Some(Method::Path);
-    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
+    let mut settings = Settings { method, width: size, height: size, stop, ..raw() };
     change(&mut settings);
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }
@@ -188,7 +189,7 @@ fn a_scene_far_from_its_origin_keeps_its_light() {
 #[test]
 fn memory_that_does_not_suffice_is_named() {
     let scene = cornell_box();
-    let mut settings = Settings { width: 64, height: 64, memory: Some(10_000), ..Settings::default() };
+    let mut settings = Settings { width: 64, height: 64, memory: Some(10_000), ..raw() };
     let flag = AtomicBool::new(false);
     let error = render::render(&scene.scene(), &settings, &mut |_| (), &flag).unwrap_err();
     let render::RenderError::Memory { needed, available } = error else { panic!("{error}") };
@@ -214,7 +215,7 @@ fn memory_of_the_build_is_given_back() {
 #[test]
 fn an_interrupted_picture_is_valid() {
     let flag = AtomicBool::new(false);
-    let settings = Settings { width: 32, height: 32, ..Settings::default() };
+    let settings = Settings { width: 32, height: 32, ..raw() };
     let scene = cornell_box();
     let mut raise = |_: &render::Progress| flag.store(true, core::sync::atomic::Ordering::Relaxed);
     let result = render::render(&scene.scene(), &settings, &mut raise, &flag).unwrap();

@@ -22,6 +22,9 @@ const TOPIC: &str = "reconstruction";
 /// Fewest samples of a half: one sample of rare light says nothing of its frequency.
 const FEWEST: u32 = 2;
 
+/// Fewest samples of a pixel of a film that is reconstructed.
+pub const LEAST_SAMPLES: u32 = 2 * FEWEST;
+
 /// Why a film is not reconstructed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotReconstructed {
@@ -54,6 +57,16 @@ pub struct FilmReconstruction<'m> {
     unit: f32,
     parts: [f32; 2],
     result: Result<Reconstructed, NotReconstructed>,
+}
+
+impl core::fmt::Debug for FilmReconstruction<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
+        let Self { size, result, .. } = self;
+        f.debug_struct("FilmReconstruction")
+            .field("size", size)
+            .field("result", result)
+            .finish_non_exhaustive()
+    }
 }
 
 impl<'m> FilmReconstruction<'m> {
@@ -179,6 +192,19 @@ impl<'m> FilmReconstruction<'m> {
     pub fn picture(&self) -> Option<impl Iterator<Item = Rgb> + '_> {
         self.result.ok()?;
         Some(self.memory.picture(self.parts).map(|light| light * self.unit))
+    }
+
+    /// Variance of the pixels of that picture, by the difference of its halves.
+    pub fn variance(&self) -> Option<impl Iterator<Item = Rgb> + '_> {
+        self.result.ok()?;
+        let product = self.parts[0] * self.parts[1] * self.unit * self.unit;
+        let apart = |value: &Both| Rgb::from_slice(&value[..3]) - Rgb::from_slice(&value[3..]);
+        Some(self.memory.halves().iter().map(move |value| product * apart(value) * apart(value)))
+    }
+
+    /// Surfaces that the pixels see, row by row.
+    pub fn surfaces(&self) -> &'m [PixelSurfaces] {
+        self.surfaces
     }
 
     /// Both halves of a pixel of that picture, and the picture itself.

@@ -44,6 +44,13 @@ impl PixelSurfaces {
         self.fractions[0] >= 1.0
     }
 
+    /// True if all of its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let Self { fractions, albedo, normal, depth, .. } = self;
+        let numbers = fractions.iter().chain(albedo).chain(normal).chain([depth]);
+        numbers.into_iter().all(|number| number.is_finite())
+    }
+
     /// The cluster of a whole pixel, else [`NO_CLUSTER`].
     #[inline]
     pub fn whole(&self) -> u32 {

@@ -167,6 +167,12 @@ impl<'m> Reconstruction<'m> {
         }
         let [width, height] = self.size;
         let Self { picture, weights, squares, .. } = self;
+        // Polynomials of great light overflow, and those near darkness are negative.
+        for_pieces(executor, picture, width, |y, row| {
+            for (light, raw) in row.iter_mut().flatten().zip(halves.values[y * width..].iter().flatten()) {
+                *light = if light.is_finite() { light.max(0.0) } else { *raw };
+            }
+        });
         let product = halves.parts[0] * halves.parts[1];
         let of_pixel = |i: usize| of_pixel(&picture[i], &halves.values[i], &weights[i], product);
         sum_squares([width, height], squares, of_pixel, executor);

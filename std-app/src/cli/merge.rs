@@ -5,7 +5,7 @@ use super::outputs::{Outputs, Role};
 use super::summary;
 use clap::Args;
 use halflight::render::{self, Merged};
-use halflight::report::{dropped_object, error_object, file_name};
+use halflight::report::{dropped_object, error_object, file_name, findings_object};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -53,6 +53,7 @@ impl Merge {
             "mean_radiance": merged.image.mean(),
             "error": error_object(merged.error, merged.noise_and_blur, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
+            "findings": findings_object(&merged.findings),
             "dropped": dropped_object(&counters.dropped, &merged.rejected_tiles, merged.empty_pixels),
             "outputs": saved.iter().map(|file| file_name(file)).collect::<Value>(),
         })
@@ -67,6 +68,7 @@ fn text(merged: &Merged, saved: &[&PathBuf]) -> String {
         Some(audit) => lines.extend(summary::audited(audit)),
         None => lines.extend(summary::estimate(merged.error, merged.noise_and_blur, merged.is_biased)),
     }
+    lines.extend(merged.findings.iter().map(|finding| format!("       {}", summary::finding(finding))));
     lines.extend(summary::rejected(&merged.counters, &merged.rejected_tiles, merged.empty_pixels));
     lines.join("\n")
 }

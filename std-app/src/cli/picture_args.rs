@@ -166,7 +166,7 @@ pub(super) struct MethodArgs {
     /// biased]
     #[arg(long, value_name = "SHARE|off", value_parser = values::audit, help_heading = "Light transport")]
     audit: Option<f64>,
-    /// Reconstruction of the picture from the halves of its film; film files keep the samples [default: off]
+    /// Reconstruction of the picture from the halves of its film; film files keep the samples [default: auto]
     #[arg(long, value_name = "WHEN", help_heading = "Results")]
     reconstruct: Option<Reconstruction>,
     /// Seed of the random numbers [default: 0]
@@ -357,8 +357,8 @@ impl MethodArgs {
             },
             audit: self.audit,
             reconstruct: match self.reconstruct {
-                Some(Reconstruction::Auto) => Reconstruct::Auto,
-                Some(Reconstruction::Off) | None => Reconstruct::Off,
+                Some(Reconstruction::Auto) | None => Reconstruct::Auto,
+                Some(Reconstruction::Off) => Reconstruct::Off,
             },
             level: self.simd.map_or(level, |tier| level.capped(tier)),
             ..settings

@@ -73,7 +73,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>, by_default: bool) -> String
 }
 
 /// Line of a finding: topic, decision, reason and values.
-fn finding(finding: &Finding) -> String {
+pub(super) fn finding(finding: &Finding) -> String {
     let values: Vec<_> = finding
         .values()
         .map(|(name, value)| format!("{} {}", readable_name(name), readable_value(value)))

@@ -5,6 +5,7 @@ use super::threads::Workers;
 use crate::save::Image;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::method::{RenderState, Shard};
+use halflight_core::reconstruction::FilmReconstruction;
 use rayon::prelude::*;
 
 /// `image` of a film with these `samples` of each pixel, with filled gaps, and the number of pixels in tiles
@@ -30,11 +31,27 @@ pub(super) fn without_gaps(
     (image, gaps)
 }
 
-pub(super) fn image(film: &Film) -> Image {
-    of_size(film, by_rows(film, |pixel| pixel.mean().to_array()).collect())
+/// Picture of a film, or its reconstruction if there is one.
+pub(super) fn image(film: &Film, made: Option<&FilmReconstruction>) -> Image {
+    let reconstructed = made.and_then(FilmReconstruction::picture);
+    let pixels = match reconstructed {
+        Some(pixels) => pixels.map(|light| light.to_array()).collect(),
+        None => by_rows(film, |pixel| pixel.mean().to_array()).collect(),
+    };
+    of_size(film, pixels)
 }
 
-pub(super) fn of_size(film: &Film, pixels: Vec<[f32; 3]>) -> Image {
+/// Variance of each pixel of that picture.
+pub(super) fn variance(film: &Film, made: Option<&FilmReconstruction>) -> Image {
+    let reconstructed = made.and_then(FilmReconstruction::variance);
+    let pixels = match reconstructed {
+        Some(pixels) => pixels.map(|variance| variance.to_array()).collect(),
+        None => by_rows(film, |pixel| pixel.variance().to_array()).collect(),
+    };
+    of_size(film, pixels)
+}
+
+fn of_size(film: &Film, pixels: Vec<[f32; 3]>) -> Image {
     Image { width: film.width(), height: film.height(), pixels }
 }
 

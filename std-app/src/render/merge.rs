@@ -9,8 +9,10 @@ use super::{Audited, ErrorEstimate, Method, NoiseAndBlur};
 use crate::memory::{Budget, lines};
 use crate::save::Image;
 use halflight_core::audit::{AuditedPixels, ErrorReport};
-use halflight_core::memory::Arena;
+use halflight_core::findings::Findings;
+use halflight_core::memory::{Arena, Footprint};
 use halflight_core::method::{RenderState, Shard};
+use halflight_core::reconstruction::{FilmReconstruction, PixelSurfaces};
 use halflight_core::transport::Counters;
 use std::path::PathBuf;
 
@@ -37,6 +39,8 @@ pub struct Merged {
     pub noise_and_blur: Option<NoiseAndBlur>,
     /// Merged result of the shards' audits.
     pub audit: Option<Audited>,
+    /// Numbers of the reconstruction, if the films have the surfaces that pixels see.
+    pub findings: Findings,
 }
 
 /// Merges the films in `files`, in any order.
@@ -61,7 +65,12 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let [width, height] = first.header.size();
     let spp = first.header.spp;
     let is_biased = first.header.method().is_some_and(Method::is_biased);
-    let footprint = RenderState::footprint(width, height);
+    let is_reconstructed = films.iter().all(|film| film.header.has_surfaces);
+    let mut footprint = RenderState::footprint(width, height);
+    if is_reconstructed {
+        let surfaces = Footprint::default().slice::<PixelSurfaces>(width as usize * height as usize);
+        footprint = footprint.and(surfaces).and(FilmReconstruction::footprint([width, height]));
+    }
     // The picture, and the data of its error estimate.
     let beside = 64 * width as usize * height as usize;
     let needed = footprint.bytes().saturating_add(beside);
@@ -72,12 +81,16 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let mut arena = Arena::over(&mut lines);
     let mut state = RenderState::new(width, height, Shard::WHOLE, &mut arena)?;
     state.is_correlated = first.header.is_correlated;
+    let surfaces = if is_reconstructed { width as usize * height as usize } else { 0 };
+    let surfaces: &mut [PixelSurfaces] = arena.slice(surfaces)?;
     let mut seconds = 0.0;
     let headers: Vec<FilmHeader> = films.iter().map(|film| film.header.clone()).collect();
     for film in films {
         seconds += film.header.seconds;
-        film.read_into(&mut state)?;
+        film.read_into(&mut state, is_reconstructed.then_some(&mut *surfaces))?;
     }
+    let new = |surfaces| FilmReconstruction::new([width, height], surfaces, &mut arena);
+    let mut reconstruction = is_reconstructed.then_some(&*surfaces).map(new).transpose()?;
     let audits = headers.iter().map(|header| Some((header.shard(), header.audit()?)));
     let audits: Option<Vec<_>> = audits.collect();
     let pixels = audits.iter().flatten().map(|(_, audit)| audit.pixels.len()).sum();
@@ -85,17 +98,26 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let pool = Pool::new(None)?;
     let report = Workers::new(&pool).estimating(|executor| {
         let film = &state.film;
+        if let Some(made) = &mut reconstruction {
+            let noise = |mean, executor: &mut Threads| {
+                ErrorEstimate::of_film(film, mean, state.is_correlated, executor)
+            };
+            let noise = film.mean_radiance(executor).and_then(|mean| noise(mean, executor));
+            made.update(film, noise, executor);
+        }
+        let made = reconstruction.as_ref();
         let judge = |mean: f64, noise: ErrorEstimate, executor: &mut Threads| {
             let merged = AuditedPixels::merged(&audits?, film, mean, &mut Arena::over(&mut audited));
             // The memory is of the stated size.
             let mut merged = merged.ok()??;
-            merged.compare(film, None, mean, executor);
+            merged.compare(film, made, mean, executor);
             merged.verdict(noise)
         };
-        ErrorReport::of_film(film, (state.is_correlated, None), judge, executor)
+        let error = made.and_then(FilmReconstruction::error);
+        ErrorReport::of_film(film, (state.is_correlated, error), judge, executor)
     });
     Ok(Merged {
-        image: image(&state.film),
+        image: image(&state.film, reconstruction.as_ref()),
         spp,
         seconds,
         counters: state.counters,
@@ -104,6 +126,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         error: report.error(),
         noise_and_blur: report.noise_and_blur,
         audit: report.audited,
+        findings: Findings::default().and(reconstruction.as_ref().map(FilmReconstruction::finding)),
         is_biased,
     })
 }

@@ -59,6 +59,7 @@ use crate::save::Image;
 use halflight_core::Level;
 use halflight_core::film::Film;
 use halflight_core::findings::Findings;
+use halflight_core::reconstruction::FilmReconstruction;
 use halflight_core::transport::Counters;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -169,7 +170,7 @@ impl Default for Settings {
             stop: Stop::default(),
             reference: None,
             audit: None,
-            reconstruct: Reconstruct::Off,
+            reconstruct: Reconstruct::Auto,
             shard: Shard::WHOLE,
             checkpoint: None,
             resume: None,
@@ -197,14 +198,15 @@ pub struct Progress<'a> {
     pub error: Option<ErrorEstimate>,
     /// A failed write of a film or a cache, reported once per file: the render continues and retries.
     pub unsaved: Option<FileError>,
-    /// The film so far.
-    pub(crate) film: Option<&'a Film<'a>>,
+    /// The film so far, and its last reconstruction.
+    pub(crate) film: Option<(&'a Film<'a>, Option<&'a FilmReconstruction<'a>>)>,
 }
 
 impl Progress<'_> {
-    /// The picture so far, which is made by this call: pixels without samples are black.
+    /// The picture so far, reconstructed at the last estimate of its error if it is reconstructed. It is made
+    /// by this call: pixels without samples are black.
     pub fn picture(&self) -> Option<Image> {
-        self.film.map(image::image)
+        self.film.map(|(film, reconstruction)| image::image(film, reconstruction))
     }
 }
 
@@ -246,7 +248,7 @@ pub struct RenderResult {
     pub rounds: u32,
     /// State after each round.
     pub history: Vec<Round>,
-    /// Estimated variance of the mean of each pixel and channel, from the two half-films.
+    /// Estimated variance of each pixel and channel of the picture, from the two half-films.
     pub variance: Image,
     /// Samples of each pixel, row by row.
     pub samples: Vec<u32>,

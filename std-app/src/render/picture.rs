@@ -4,10 +4,9 @@ use super::audit::ThreadedAudit;
 use super::files::{self, FilmHeader, FilmReader, Identity, RewrittenFile};
 use super::gaps::Sketch;
 use super::history::{Clock, Reference, Round};
-use super::image::{by_rows, image, of_size, without_gaps};
+use super::image::{by_rows, image, variance, without_gaps};
 use super::memory::Memory;
 use super::method::Renderer;
-use super::reconstruction;
 use super::rejected_tiles::{self, empty_pixels};
 use super::setup::RenderSetup;
 use super::survey::Survey;
@@ -18,7 +17,6 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use halflight_core::audit::{ErrorReport, ExtraTime, Spent};
 use halflight_core::bsdf::Features;
-use halflight_core::film::Pixel;
 use halflight_core::findings::{Findings, Value};
 use halflight_core::method::hidden_light::HiddenLight;
 use halflight_core::method::{RenderState, Shard};
@@ -114,7 +112,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             None => (Rounds::new(settings.stop), Vec::new()),
             Some(film) => {
                 let header = film.header.clone();
-                clock.pause(|| film.read_into(state))?;
+                clock.pause(|| film.read_into(state, None))?;
                 let FilmHeader { spp, rounds, seconds, .. } = header;
                 if let (Some(audit), Some(earlier)) = (audit, header.audit()) {
                     audit.audit.resume(&earlier);
@@ -162,12 +160,13 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             true => self.estimate(renderer)?,
             false => None,
         };
-        let Picture { setup, state, clock, .. } = &mut self.picture;
+        let Picture { setup, state, reconstruction, clock, .. } = &mut self.picture;
         let (seconds, spp) = (clock.seconds(), self.rounds.spp());
-        let reference = self
-            .reference
-            .as_ref()
-            .map(|r| clock.pause(|| r.compare(&setup.workers.install(|| image(&state.film)))));
+        // A picture is reconstructed with its estimate.
+        let is_new = error.is_some() || reconstruction.as_ref().is_none_or(|made| made.error().is_none());
+        let picture = || setup.workers.install(|| image(&state.film, reconstruction.as_ref()));
+        let reference = self.reference.as_ref().filter(|_| is_new);
+        let reference = reference.map(|reference| clock.pause(|| reference.compare(&picture())));
         self.history.push(Round { seconds, spp, rays: state.counters.all_rays(), error, reference });
         let is_due = |every: f64| self.saved.elapsed().as_secs_f64() >= every;
         let checkpoint = setup.settings.checkpoint.as_ref();
@@ -176,9 +175,9 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             self.saved = Instant::now();
         }
         let unsaved = self.kept.new_failure().or_else(|| renderer.kept()?.new_failure());
-        let Picture { clock, progress, state, .. } = &mut self.picture;
+        let Picture { clock, progress, state, reconstruction, .. } = &mut self.picture;
         let known = progress_of(&self.rounds, seconds, self.latest);
-        let known = Progress { unsaved, film: Some(&state.film), ..known };
+        let known = Progress { unsaved, film: Some((&state.film, reconstruction.as_ref())), ..known };
         clock.pause(|| progress(&known));
         Ok(())
     }
@@ -272,13 +271,14 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
 
     /// Writes the film file, during the render or at the end with patience `last`.
     fn write_film(&mut self, seconds: f64, last: Option<Patience>) {
-        let Picture { method, state, audit, identity, clock, .. } = &mut self.picture;
+        let Picture { method, state, audit, reconstruction, identity, clock, .. } = &mut self.picture;
         let (kept, rounds, history) = (&mut self.kept, &self.rounds, &self.history);
         clock.pause(|| {
             let write = |path: &Path, patience: Patience| {
-                let audit = audit.as_ref().map(|audit| audit.audit.state());
-                let header = FilmHeader::new((identity, *method), state, rounds, audit, seconds, history);
-                files::write_film(path, &header, state, patience)
+                let surfaces = reconstruction.as_ref().map(FilmReconstruction::surfaces);
+                let beside = (audit.as_ref().map(|audit| audit.audit.state()), surfaces.is_some());
+                let header = FilmHeader::new((identity, *method), state, rounds, beside, seconds, history);
+                files::write_film(path, &header, (state, surfaces), patience)
             };
             match last {
                 Some(patience) => kept.finish(patience, write),
@@ -334,11 +334,11 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             last.error = error;
         }
         let film = &state.film;
-        let values = |pixel: Pixel| (pixel.count(), (pixel.mean().to_array(), pixel.variance().to_array()));
-        let (samples, (mean, variance)): (Vec<u32>, (Vec<_>, Vec<_>)) =
-            workers.install(|| by_rows(film, values).unzip());
-        let mean = reconstruction::picture(reconstruction.as_ref()).unwrap_or(mean);
-        let (image, filled_pixels) = without_gaps(of_size(film, mean), &samples, (state, sketch, workers));
+        let made = reconstruction.as_ref();
+        let pictures = || (image(film, made), variance(film, made));
+        let (image, variance) = workers.install(pictures);
+        let samples: Vec<u32> = workers.install(|| by_rows(film, |pixel| pixel.count()).collect());
+        let (image, filled_pixels) = without_gaps(image, &samples, (state, sketch, workers));
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
         // A report that does not fit into memory is omitted: the picture is complete.
@@ -353,14 +353,14 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             spp: self.rounds.spp(),
             rounds: self.rounds.count(),
             history: self.history,
-            variance: of_size(film, variance),
+            variance,
             samples,
             threads: workers.count(),
             seconds: Seconds { build: 0.0, render, estimate: self.estimated },
             counters: state.counters,
             findings: findings
                 .and(report.lacking.map(|lacking| lacking.finding()))
-                .and(reconstruction.as_ref().map(FilmReconstruction::finding))
+                .and(made.map(FilmReconstruction::finding))
                 .and(survey.as_ref().map(Survey::finding)),
             survey,
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },

@@ -6,17 +6,18 @@ use super::setup::RenderSetup;
 use super::threads::Threads;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::MemorySource;
-use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces};
+use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces, LEAST_SAMPLES};
 use halflight_core::renderer::Reconstruct;
 
-/// Searches for the surfaces of the view, if the settings ask for a reconstruction and a whole picture is
-/// rendered. `None` also at the end of the time.
+/// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples; `None` also at the end of
+/// the time. The film file of a shard keeps them for the merged picture.
 pub(super) fn set_up<'m, 'a: 'm, F: Features>(
     setup: &RenderSetup<'a>,
     memory: &mut Memory<'m>,
 ) -> Result<Option<FilmReconstruction<'m>>, RenderError> {
     let RenderSetup { scene, settings, workers, .. } = *setup;
-    if settings.reconstruct == Reconstruct::Off || settings.shard.count > 1 {
+    let has_few = settings.stop.spp.is_some_and(|spp| spp < LEAST_SAMPLES);
+    if settings.reconstruct == Reconstruct::Off || has_few {
         return Ok(None);
     }
     let size = [settings.width, settings.height];
@@ -25,9 +26,4 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
     let mut scratch = memory.take_each("surfaces", FirstSurfaces::<F>::scratch(), workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);
     Ok(FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?)
-}
-
-/// The reconstructed picture, row by row, if there is one.
-pub(super) fn picture(made: Option<&FilmReconstruction>) -> Option<Vec<[f32; 3]>> {
-    Some(made?.picture()?.map(|light| light.to_array()).collect())
 }

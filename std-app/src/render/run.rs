@@ -10,7 +10,7 @@ use super::picture::{self, Picture};
 use super::setup::RenderSetup;
 use super::threads::{Pool, Workers};
 use super::{
-    Ending, MOST_PIXELS, Method, Progress, RenderError, RenderResult, Seconds, Settings,
+    Ending, MOST_PIXELS, Method, Progress, Reconstruct, RenderError, RenderResult, Seconds, Settings,
     environment_visibility, gaps, reconstruction,
 };
 use core::sync::atomic::AtomicBool;
@@ -213,9 +213,10 @@ fn falls_back(done: &RenderResult, settings: &Settings, seconds: f64) -> bool {
 }
 
 /// Settings of a picture whose time suffices for a few samples of each pixel: paths without the structures
-/// that a pilot chooses.
+/// that a pilot chooses, and without a reconstruction.
 fn without_pilots(settings: &Settings) -> Settings {
     let reuse = settings.reuse.or(Some(false));
     let environment_visibility = settings.environment_visibility.or(Some(false));
-    Settings { caustics: false, reuse, environment_visibility, ..settings.clone() }
+    let reconstruct = Reconstruct::Off;
+    Settings { caustics: false, reuse, environment_visibility, reconstruct, ..settings.clone() }
 }

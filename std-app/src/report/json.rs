@@ -63,7 +63,7 @@ pub(super) fn run(run: &Run) -> Value {
         "filled_pixels": result.filled_pixels,
         "memory": memory.collect::<Map<_, _>>(),
         "memory_peak": result.memory_peak,
-        "findings": findings(&result.findings),
+        "findings": findings_object(&result.findings),
         "census": contents.collect::<Map<_, _>>(),
         "repairs": run.repairs,
         "left_out": left_out_array(plan.left_out().chain(techniques_left_out(&result.findings))),
@@ -80,7 +80,7 @@ pub fn file_name(file: &Path) -> Value {
 }
 
 /// Findings by topic: decision, reason and values.
-fn findings(findings: &Findings) -> Value {
+pub fn findings_object(findings: &Findings) -> Value {
     let value = |value| match value {
         FindingValue::Count(count) => count.into(),
         FindingValue::Seconds(value) | FindingValue::Fraction(value) | FindingValue::Number(value) => {

@@ -13,7 +13,7 @@ mod race;
 
 pub use census::counts;
 pub use folder::{check_folder, report_files, write_folder};
-pub use json::{comparison_object, dropped_object, error_object, file_name, left_out_array};
+pub use json::{comparison_object, dropped_object, error_object, file_name, findings_object, left_out_array};
 pub use provenance::Provenance;
 pub use race::{Race, RaceEntry};
 

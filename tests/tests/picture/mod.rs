@@ -2,6 +2,7 @@
 
 use core::sync::atomic::AtomicBool;
 use halflight::render::{self, Settings, Stop};
+use halflight_tests::render::raw;
 use halflight_tests::scenes::SceneBuffers;
 use halflight_tests::statistics::judge;
 
@@ -17,7 +18,7 @@ const SPP: u32 = 64;
 /// The first channel of a picture of `scene`.
 pub(crate) fn render(scene: &SceneBuffers, seed: u32, change: impl FnOnce(&mut Settings)) -> Vec<f64> {
     let stop = Stop { spp: Some(SPP), ..Stop::default() };
-    let mut settings = Settings { width: SIZE, height: SIZE, seed, stop, ..Settings::default() };
+    let mut settings = Settings { width: SIZE, height: SIZE, seed, stop, ..raw() };
     change(&mut settings);
     let result = render::render(&scene.scene(), &settings, &mut |_| (), &AtomicBool::new(false));
     let result = result.unwrap_or_else(|error| panic!("{error}"));

@@ -10,7 +10,7 @@ use halflight::render::{self, Checkpoint, Ending, RenderError, RenderResult, Set
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, PointLight};
 use halflight_simd::Level;
-use halflight_tests::render::{render, try_render};
+use halflight_tests::render::{raw, render, try_render};
 use halflight_tests::scenes::{IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, cornell_box, metal};
 use halflight_tests::statistics::agree_within;
 use std::sync::mpsc;
@@ -187,8 +187,7 @@ fn ended(buffers: SceneBuffers, row: &Row, is_interrupted: bool) -> RenderResult
     thread::spawn(move || {
         let seconds = Some(if is_interrupted { 3600.0 } else { SECONDS });
         let stop = Stop { seconds, ..Stop::default() };
-        let settings =
-            Settings { method, width: 24, height: 24, threads: Some(2), stop, ..Settings::default() };
+        let settings = Settings { method, width: 24, height: 24, threads: Some(2), stop, ..raw() };
         let settings = Settings { survey: Some(20), ..settings };
         let (flag, start) = (AtomicBool::new(false), Instant::now());
         let done = thread::scope(|scope| {

@@ -1,7 +1,7 @@
 //! The audit finds bias where it exists, and nowhere else.
 
 use crate::load::{LoadOptions, load};
-use crate::render::{AuditWork, Audited, Checkpoint, Ending, Method, RenderResult};
+use crate::render::{AuditWork, Audited, Checkpoint, Ending, Method, Reconstruct, RenderResult};
 use crate::render::{Settings, Shard, Stop, merge, render};
 use core::sync::atomic::AtomicBool;
 use halflight_core::estimate::Difference;
@@ -31,6 +31,7 @@ fn settings(method: Method, spp: u32, seed: u32, audit: f64) -> Settings {
         reuse: Some(false),
         width: SIZE,
         height: SIZE,
+        reconstruct: Reconstruct::Off,
         ..Settings::default()
     }
 }

@@ -6,33 +6,49 @@ use super::identity::Identity;
 use crate::file_error::FileError;
 use crate::render::MOST_PIXELS;
 use crate::save::Patience;
-use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
+use core::ops::Range;
+use halflight_core::film::{Dropped, PIXELS_PER_TILE, TILE, Tile};
 use halflight_core::method::{RenderState, Shard};
+use halflight_core::reconstruction::PixelSurfaces;
 use halflight_core::transport::Counters;
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLFILM", version: 9, name: "film" };
+const KIND: Kind = Kind { magic: *b"HLFILM", version: 10, name: "film" };
 
-/// Writes the film of `state` to `path`, completely or not at all.
+/// Writes the film of `state` and the surfaces that its pixels see, if the header has them, to `path`,
+/// completely or not at all.
 pub(in crate::render) fn write(
     path: &Path,
     header: &FilmHeader,
-    state: &RenderState,
+    (state, surfaces): (&RenderState, Option<&[PixelSurfaces]>),
     patience: Patience,
 ) -> Result<(), FileError> {
     container::write(path, &KIND, header, patience, |file| {
         file.put(bytemuck::bytes_of(&state.counters))?;
         file.put_list(state.dropped)?;
         file.put_list(state.samples)?;
-        let tiles = tiles(state.film.pixels(), state.samples);
-        tiles.into_iter().try_for_each(|pixels| file.put(bytemuck::cast_slice(pixels)))
+        // Tiles without samples are not stored.
+        let tiles = state.film.pixels().chunks(PIXELS_PER_TILE).enumerate();
+        for (task, pixels) in tiles.filter(|(task, _)| state.samples[*task] > 0) {
+            file.put(bytemuck::cast_slice(pixels))?;
+            if let Some(surfaces) = surfaces {
+                let of_tile: Vec<_> =
+                    rows(header.size(), task).flat_map(|row| &surfaces[row]).copied().collect();
+                file.put(bytemuck::cast_slice(&of_tile))?;
+            }
+        }
+        Ok(())
     })
 }
 
-/// Tiles with samples; others are not stored.
-fn tiles<'a>(pixels: &'a [Pixel], taken: &'a [u32]) -> impl Iterator<Item = &'a [Pixel]> {
-    let tiles = pixels.chunks(PIXELS_PER_TILE).zip(taken);
-    tiles.filter(|(_, taken)| **taken > 0).map(|(pixels, _)| pixels)
+/// Pixels of a tile in a picture that is stored row by row.
+fn rows([width, height]: [u32; 2], task: usize) -> impl Iterator<Item = Range<usize>> {
+    let [x, y] = Tile::new(width, height, task).corner();
+    let columns = x as usize..(x + TILE).min(width) as usize;
+    (y..(y + TILE).min(height)).map(move |y| {
+        let row = y as usize * width as usize;
+        row + columns.start..row + columns.end
+    })
 }
 
 /// A film file after its header was read.
@@ -84,8 +100,12 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the stored tiles into `state`, a film of the same size.
-    pub(in crate::render) fn read_into(mut self, state: &mut RenderState) -> Result<(), FileError> {
+    /// Reads the stored tiles into `state`, a film of the same size, and their `surfaces` into a picture.
+    pub(in crate::render) fn read_into(
+        mut self,
+        state: &mut RenderState,
+        mut surfaces: Option<&mut [PixelSurfaces]>,
+    ) -> Result<(), FileError> {
         let [width, height] = self.header.size();
         let tiles = Tile::count(width, height);
         if tiles != state.samples.len() {
@@ -104,6 +124,18 @@ impl Reader {
                 return Err(self.file.damage("it has tiles of other shards"));
             }
             self.file.get(bytemuck::cast_slice_mut(pixels))?;
+            if self.header.has_surfaces {
+                let count = rows([width, height], task).map(|row| row.len()).sum();
+                let mut of_tile = vec![PixelSurfaces::default(); count];
+                self.file.get(bytemuck::cast_slice_mut(&mut of_tile))?;
+                if !of_tile.iter().all(PixelSurfaces::is_finite) {
+                    return Err(self.file.damage("it has surfaces that are not numbers"));
+                }
+                if let Some(surfaces) = &mut surfaces {
+                    let places = rows([width, height], task).flatten();
+                    places.zip(of_tile).for_each(|(place, found)| surfaces[place] = found);
+                }
+            }
             state.samples[task] = taken[task];
         }
         self.file.finish()?;

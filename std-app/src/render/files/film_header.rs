@@ -19,6 +19,8 @@ pub(in crate::render) struct FilmHeader {
     /// Shard number, from 1, and number of shards.
     shard: [u32; 2],
     pub(in crate::render) is_correlated: bool,
+    /// True if the file has the surfaces that pixels see, for the reconstruction of a merged picture.
+    pub(in crate::render) has_surfaces: bool,
     pub(in crate::render) spp: u32,
     pub(in crate::render) rounds: u32,
     /// Samples at the next estimate of the error; samples and result of the last one; samples and noise of
@@ -42,7 +44,7 @@ impl FilmHeader {
         (identity, method): (&Identity, Method),
         state: &RenderState,
         rounds: &Rounds,
-        audit: Option<AuditState>,
+        (audit, has_surfaces): (Option<AuditState>, bool),
         seconds: f64,
         history: &[Round],
     ) -> Self {
@@ -56,6 +58,7 @@ impl FilmHeader {
             height: film.height(),
             shard: [shard.index + 1, shard.count],
             is_correlated: state.is_correlated,
+            has_surfaces,
             spp: state.spp(),
             rounds: rounds.count(),
             next_estimate: next,

@@ -3,7 +3,7 @@
 use core::sync::atomic::AtomicBool;
 use glam::{DVec3, Mat3};
 use halflight::load::SceneTransform;
-use halflight::render::{Settings, Stop, render};
+use halflight::render::{Reconstruct, Settings, Stop, render};
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Environment, Material, Mesh, PointLight, Scene, Surface, Triangle};
 
@@ -133,6 +133,7 @@ impl TestScene {
             height: self.size[1],
             stop: Stop { spp: Some(self.spp), ..Stop::default() },
             reuse: Some(false),
+            reconstruct: Reconstruct::Off,
             ..Settings::default()
         };
         let picture = render(&scene, &settings, &mut |_| {}, &AtomicBool::new(false));
