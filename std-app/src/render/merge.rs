@@ -52,16 +52,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let films = files.iter().map(|file| FilmReader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
     let (Some(first), Some(name)) = (films.first(), files.first()) else { return Err(RenderError::Shard) };
     films.iter().try_for_each(|film| film.check_sibling(first))?;
-    let count = first.header.shard().count;
-    for index in 0..count {
-        let found = films.iter().filter(|film| film.header.shard().index == index).count();
-        if found != 1 {
-            let how = if found == 0 { "missing" } else { "there more than once" };
-            let reason = format!("is one of {count} shards, of which shard {}/{count} is {how}", index + 1);
-            return Err(FileError::new(reason).at(name).into());
-        }
-    }
-
+    check_shards(&films).map_err(|reason| FileError::new(reason).at(name))?;
     let [width, height] = first.header.size();
     let spp = first.header.spp;
     let is_biased = first.header.method().is_some_and(Method::is_biased);
@@ -129,4 +120,17 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         findings: Findings::default().and(reconstruction.as_ref().map(FilmReconstruction::finding)),
         is_biased,
     })
+}
+
+/// The reason why `films` of one picture are not all of its shards.
+fn check_shards(films: &[FilmReader]) -> Result<(), String> {
+    let count = films.first().map_or(0, |first| first.header.shard().count);
+    for index in 0..count {
+        let found = films.iter().filter(|film| film.header.shard().index == index).count();
+        if found != 1 {
+            let how = if found == 0 { "missing" } else { "there more than once" };
+            return Err(format!("is one of {count} shards, of which shard {}/{count} is {how}", index + 1));
+        }
+    }
+    Ok(())
 }

@@ -9,8 +9,8 @@ use halflight_core::memory::MemorySource;
 use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces, LEAST_SAMPLES};
 use halflight_core::renderer::Reconstruct;
 
-/// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples; `None` also at the end of
-/// the time. The film file of a shard keeps them for the merged picture.
+/// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples; `None`
+/// also at the end of the time. The film file of a shard keeps them for the merged picture.
 pub(super) fn set_up<'m, 'a: 'm, F: Features>(
     setup: &RenderSetup<'a>,
     memory: &mut Memory<'m>,
