@@ -112,6 +112,10 @@ impl ErrorReport {
                 noise_and_blur = Some(NoiseAndBlur { noise, blur, total: noise.with_bias(blur) });
             }
         }
+        // All pixels know the bias of the reconstruction better than the few of an audit do.
+        if let (Some(audited), Some(error)) = (&mut audited, self.reconstructed) {
+            audited.total = audited.total.max(error.total);
+        }
         Self { noise: self.noise, audited, noise_and_blur, ..self }
     }
 

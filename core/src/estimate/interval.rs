@@ -57,6 +57,15 @@ const DELTA_DAMPING: f64 = 10.0;
 const LEAST_SEEN: f64 = 0.01;
 
 impl ErrorEstimate {
+    /// The larger of two estimates of which each has parts that the other lacks.
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            relmse: self.relmse.max(other.relmse),
+            lower: self.lower.max(other.lower),
+            upper: self.upper.max(other.upper),
+        }
+    }
+
     /// Estimate from all tiles of a picture whose pixels share nothing, or share paths within groups and
     /// photons with neighbours; `None` if no pixel has four samples.
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
