@@ -19,5 +19,6 @@ mod pictures;
 mod pipes;
 #[cfg(target_os = "linux")]
 mod process;
+mod reconstruction;
 mod renderer;
 mod support;

@@ -17,7 +17,7 @@ use crate::scene::Mesh;
 use crate::transport::PathSettings;
 
 /// Name of the finding.
-const TOPIC: &str = "reconstruction";
+pub const TOPIC: &str = "reconstruction";
 
 /// Fewest samples of a half: one sample of rare light says nothing of its frequency.
 const FEWEST: u32 = 2;

@@ -31,7 +31,7 @@ mod work;
 
 pub use components::SurfaceComponents;
 pub use error::{ReconstructionError, SquareError};
-pub use film::{FilmReconstruction, LEAST_SAMPLES, NotReconstructed};
+pub use film::{FilmReconstruction, LEAST_SAMPLES, NotReconstructed, TOPIC};
 pub use first_surfaces::FirstSurfaces;
 pub(crate) use passes::for_pieces;
 pub use surfaces::{NO_CLUSTER, PixelSurfaces};
