@@ -11,7 +11,8 @@ use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces, LEAST_SA
 use halflight_core::renderer::Reconstruct;
 
 /// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples; `None`
-/// also at the end of the time, and where memory is lacking. The film file of a shard keeps them for the merged picture.
+/// also at the end of the time, and where memory is lacking. The film file of a shard keeps them for the
+/// merged picture.
 pub(super) fn set_up<'m, 'a: 'm, F: Features>(
     setup: &RenderSetup<'a>,
     memory: &mut Memory<'m>,
