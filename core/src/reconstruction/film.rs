@@ -28,6 +28,8 @@ pub const LEAST_SAMPLES: u32 = 2 * FEWEST;
 /// Why a film is not reconstructed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotReconstructed {
+    /// Distant pixels share data.
+    Correlated,
     /// A half of a pixel has fewer than two samples.
     FewSamples,
     /// No half has met light.
@@ -40,6 +42,7 @@ impl NotReconstructed {
     /// Reason in reports.
     pub const fn reason(self) -> &'static str {
         match self {
+            Self::Correlated => "pixels that share records or photons cannot judge each other",
             Self::FewSamples => "a half of the film has fewer than two samples of a pixel",
             Self::Black => "no sample has met light",
             Self::NoGain => "the error of the samples is not larger",
@@ -122,6 +125,11 @@ impl<'m> FilmReconstruction<'m> {
         let memory = Reconstruction::new(size, arena)?;
         let (size, result) = ([width, height], Err(NotReconstructed::FewSamples));
         Ok(Self { surfaces, values, groups, memory, size, unit: 1.0, parts: [0.5; 2], result })
+    }
+
+    /// Leaves the picture as it is.
+    pub fn leave(&mut self, reason: NotReconstructed) {
+        self.result = Err(reason);
     }
 
     /// Reconstructs `film`, whose own error is `raw`, if that makes the error smaller.

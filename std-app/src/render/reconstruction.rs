@@ -1,27 +1,34 @@
 //! Reconstruction of the core in the program: memory and threads around it.
 
-use super::RenderError;
 use super::memory::Memory;
 use super::setup::RenderSetup;
 use super::threads::Threads;
+use super::{Method, RenderError};
 use halflight_core::bsdf::Features;
-use halflight_core::findings::{Decision, Finding};
+use halflight_core::findings::Decision::LeftOut;
+use halflight_core::findings::Finding;
 use halflight_core::memory::MemorySource;
-use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces, LEAST_SAMPLES, TOPIC};
+use halflight_core::reconstruction::{
+    FilmReconstruction, FirstSurfaces, LEAST_SAMPLES, NotReconstructed, TOPIC,
+};
 use halflight_core::renderer::Reconstruct;
 
-/// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples; `None`
-/// also at the end of the time, and where memory is lacking. The film file of a shard keeps them for the
-/// merged picture.
+/// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples, and the
+/// finding where `method` or the memory allow none. Nothing also at the end of the time. The film file of a
+/// shard keeps the surfaces for the merged picture.
 pub(super) fn set_up<'m, 'a: 'm, F: Features>(
     setup: &RenderSetup<'a>,
+    method: Method,
     memory: &mut Memory<'m>,
-    lacks_memory: &mut bool,
-) -> Result<Option<FilmReconstruction<'m>>, RenderError> {
+) -> Result<(Option<FilmReconstruction<'m>>, Option<Finding>), RenderError> {
     let RenderSetup { scene, settings, workers, .. } = *setup;
     let has_few = settings.stop.spp.is_some_and(|spp| spp < LEAST_SAMPLES);
-    if settings.reconstruct == Reconstruct::Off || has_few || *lacks_memory {
-        return Ok(None);
+    if settings.reconstruct == Reconstruct::Off || has_few {
+        return Ok((None, None));
+    }
+    let without = |reason| Ok((None, Some(Finding::new(TOPIC, LeftOut, reason))));
+    if method.shares() {
+        return without(NotReconstructed::Correlated.reason());
     }
     let size = [settings.width, settings.height];
     let [kept, search] = FilmReconstruction::footprints_of_view::<F>(&scene.mesh, size);
@@ -30,17 +37,9 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
         Ok((arena, memory.take_each("surfaces", FirstSurfaces::<F>::scratch(), workers.count())?))
     };
     let (mut arena, mut scratch) = match take() {
-        Err(RenderError::Memory { .. }) => {
-            *lacks_memory = true;
-            return Ok(None);
-        }
+        Err(RenderError::Memory { .. }) => return without("there is too little memory"),
         taken => taken?,
     };
     let mut executor = Threads::new(workers, &mut scratch);
-    Ok(FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?)
-}
-
-/// Finding of a picture for whose reconstruction there is too little memory.
-pub(super) fn without_memory() -> Finding {
-    Finding::new(TOPIC, Decision::LeftOut, "there is too little memory")
+    Ok((FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?, None))
 }

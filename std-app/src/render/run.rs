@@ -157,19 +157,12 @@ impl WithFeatures for Render<'_> {
         let is_open = settings.method.is_none() && resumed.is_none();
         let mut plan = if is_open { MethodPlan::open() } else { MethodPlan::from(method) };
         let mut may_fall_back = is_open;
-        let mut lacks_memory = false;
         loop {
             let mut own = memory.within();
-            let reconstruction = reconstruction::set_up::<F>(&setup, &mut own, &mut lacks_memory)?;
             let Ready { mut renderer, audit, hidden } = match method::set_up::<F>(plan, &setup, &mut own) {
                 Ok(Attempt::Ready(ready)) => *ready,
                 Ok(Attempt::Instead(better)) => {
                     plan = *better;
-                    continue;
-                }
-                // The method needs memory before the reconstruction of its pictures does.
-                Err(RenderError::Memory { .. }) if reconstruction.is_some() => {
-                    lacks_memory = true;
                     continue;
                 }
                 // A method that was chosen may need more memory than path tracing.
@@ -181,6 +174,7 @@ impl WithFeatures for Render<'_> {
                 Err(error) => return Err(error),
             };
             let method = renderer.chosen();
+            let (reconstruction, raw) = reconstruction::set_up::<F>(&setup, method, &mut own)?;
             let picture = Picture {
                 method,
                 setup,
@@ -203,7 +197,6 @@ impl WithFeatures for Render<'_> {
                 continue;
             }
             let seconds = Seconds { build: built.seconds(), ..done.seconds };
-            let raw = lacks_memory.then(reconstruction::without_memory);
             let findings = Findings::default().and(pilots).and(visibility).and(done.findings).and(raw);
             let (memory, memory_peak) = (own.uses(), own.peak());
             return Ok(RenderResult { memory, memory_peak, seconds, findings, ..done });
