@@ -1,14 +1,23 @@
 //! Irradiance at points of a scene, each value with its interval: memory, threads, time and stop rules around
 //! [`halflight_core::IrradianceRenderer`].
 
+mod charts;
+mod grid;
+mod lightmap;
+mod map;
 mod points;
+mod raster;
 mod table;
+mod tilted;
 
 pub use crate::render::{BakeProgress, BakeSettings, Baked};
+pub use lightmap::{Lightmap, LightmapError, LightmapSettings};
+pub use map::{LightMap, Texel, check as check_format};
 pub use points::{Sensor, read_sensors, vertices};
 pub use table::{Quantity, TableFormat, write_table};
 
-use crate::render::{Built, BuiltMemory, Pool, RenderError, with_points};
+use crate::memory::Budget;
+use crate::render::{Built, BuiltMemory, Pool, RenderError, scene_bytes, with_points};
 use core::sync::atomic::AtomicBool;
 use halflight_core::IrradiancePoint;
 use halflight_core::scene::Scene;
@@ -28,4 +37,12 @@ pub fn irradiance(
     let (pool, owner) = (Pool::new(settings.threads)?, BuiltMemory::default());
     let built = Built::new(scene, (settings.level, settings.memory), &pool, &owner)?;
     with_points((scene, &built), (points, settings), &pool, progress, interrupt)
+}
+
+/// The memory that `scene` leaves of `limit` bytes; `None`: of four fifths of the machine.
+pub fn budget(scene: &Scene, limit: Option<usize>) -> Budget {
+    let mut budget = Budget::new(limit);
+    // A scene that fills the limit leaves nothing.
+    let _ = budget.take(scene_bytes(scene).min(budget.left()));
+    budget
 }

@@ -23,6 +23,15 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// Factor on irradiance of R, G, B.
+    pub(super) fn scale(self) -> f32 {
+        match self {
+            Quantity::Irradiance => 1.0,
+            Quantity::White => FRAC_1_PI,
+            Quantity::Lux => RADIANCE_EFFICACY,
+        }
+    }
+
     /// Value, lower and upper end of its interval, and R, G, B.
     fn of(self, point: &PointIrradiance) -> ([f32; 3], Rgb) {
         let scaled = |scale: f32| [point.value(), point.lower, point.upper].map(|value| value * scale);
@@ -65,7 +74,7 @@ impl TableFormat {
     }
 }
 
-/// Writes the `values` at `sensors`.
+/// Writes the `values` at `sensors`, with their fractions of back faces, or none.
 ///
 /// # Errors
 /// Those of `out`.
@@ -73,15 +82,16 @@ pub fn write_table(
     out: &mut dyn Write,
     (format, quantity): (TableFormat, Quantity),
     sensors: &[Sensor],
-    values: &[PointIrradiance],
+    (values, back_faces): (&[PointIrradiance], &[f32]),
 ) -> io::Result<()> {
-    let rows = sensors.iter().zip(values).map(|(sensor, point)| {
+    let shares = back_faces.iter().copied().chain(core::iter::repeat(0.0));
+    let rows = sensors.iter().zip(values).zip(shares).map(|((sensor, point), back_faces)| {
         let ([value, lower, upper], rgb) = quantity.of(point);
-        Row { sensor, rgb, value, lower, upper, samples: point.samples }
+        Row { sensor, rgb, value, lower, upper, samples: point.samples, back_faces }
     });
     match format {
         TableFormat::Csv => {
-            writeln!(out, "x,y,z,nx,ny,nz,r,g,b,value,lower,upper,samples")?;
+            writeln!(out, "x,y,z,nx,ny,nz,r,g,b,value,lower,upper,samples,back_faces")?;
             rows.into_iter().try_for_each(|row| row.csv(out))
         }
         TableFormat::Res => rows
@@ -102,14 +112,15 @@ struct Row<'a> {
     lower: f32,
     upper: f32,
     samples: u32,
+    back_faces: f32,
 }
 
 impl Row<'_> {
     fn csv(&self, out: &mut dyn Write) -> io::Result<()> {
         let Self { sensor: Sensor { position: [x, y, z], normal: [a, b, c] }, rgb, .. } = self;
-        let Self { value, lower, upper, samples, .. } = self;
+        let Self { value, lower, upper, samples, back_faces, .. } = self;
         write!(out, "{x},{y},{z},{a},{b},{c},{},{},{},", rgb.x, rgb.y, rgb.z)?;
-        writeln!(out, "{value},{lower},{upper},{samples}")
+        writeln!(out, "{value},{lower},{upper},{samples},{back_faces}")
     }
 
     /// `white` is displayed as white.
@@ -120,6 +131,7 @@ impl Row<'_> {
             out.write_all(&number.to_le_bytes())?;
         }
         out.write_all(&self.samples.to_le_bytes())?;
+        out.write_all(&self.back_faces.to_le_bytes())?;
         let display = (self.rgb / white.max(f32::MIN_POSITIVE)).to_array().map(crate::save::display_byte);
         out.write_all(&display)
     }
@@ -130,7 +142,7 @@ fn ply_header(out: &mut dyn Write, count: usize) -> io::Result<()> {
     for name in ["x", "y", "z", "nx", "ny", "nz", "r", "g", "b", "value", "lower", "upper"] {
         writeln!(out, "property float {name}")?;
     }
-    writeln!(out, "property uint samples")?;
+    writeln!(out, "property uint samples\nproperty float back_faces")?;
     for name in ["red", "green", "blue"] {
         writeln!(out, "property uchar {name}")?;
     }
@@ -147,7 +159,7 @@ mod tests {
 
     fn table(format: TableFormat, quantity: Quantity) -> Vec<u8> {
         let mut bytes = Vec::new();
-        write_table(&mut bytes, (format, quantity), &[SENSOR], &[POINT]).unwrap();
+        write_table(&mut bytes, (format, quantity), &[SENSOR], (&[POINT], &[0.25])).unwrap();
         bytes
     }
 
@@ -164,12 +176,12 @@ mod tests {
     #[test]
     fn tables_are_those_of_their_readers() {
         let text = String::from_utf8(table(TableFormat::Csv, Quantity::Irradiance)).unwrap();
-        assert!(text.ends_with("samples\n1,2,3,0,1,0,2,2,2,2,1.5,2.5,64\n"), "{text}");
+        assert!(text.ends_with("back_faces\n1,2,3,0,1,0,2,2,2,2,1.5,2.5,64,0.25\n"), "{text}");
         let text = String::from_utf8(table(TableFormat::Res, Quantity::Irradiance)).unwrap();
         assert_eq!(text.split_whitespace().map(|x| x.parse::<f32>().unwrap()).collect::<Vec<_>>(), [2.0; 3]);
         let ply = table(TableFormat::Ply, Quantity::Irradiance);
         let end = ply.windows(11).position(|bytes| bytes == b"end_header\n").unwrap() + 11;
-        assert_eq!(ply.len() - end, 12 * 4 + 4 + 3);
+        assert_eq!(ply.len() - end, 12 * 4 + 4 + 4 + 3);
         assert_eq!(&ply[ply.len() - 3..], [255; 3]);
     }
 }

@@ -1,5 +1,7 @@
 //! `halflight bake`: irradiance at points, each with its interval.
 
+mod lightmap;
+
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::outputs::{Outputs, Role};
@@ -23,20 +25,24 @@ use std::process::ExitCode;
 
 /// Estimate irradiance at points, each with its 95 % interval
 ///
-/// Points are the sensors of a grid, a line `x y z nx ny nz` each, or the vertices of the scene. A sensor
-/// that lies on a surface within rounding is put on it, on the side of its normal. The first of --spp, --time
-/// and --error that holds ends the work; without one it ends when the intervals are 2 %, or after 60 s.
+/// Points are the sensors of a grid, a line `x y z nx ny nz` each, the vertices of the scene, or the texels
+/// of a lightmap. A sensor that lies on a surface within rounding is put on it, on the side of its normal.
+/// The first of --spp, --time and --error that holds ends the work; without one it ends when the intervals
+/// are 2 %, or after 60 s.
 #[derive(Args)]
 pub(super) struct Bake {
     /// Scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
     /// Sensors, a line `x y z nx ny nz` each; `-` is standard input
-    #[arg(long, value_name = "FILE", required_unless_present = "vertices", conflicts_with = "vertices")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["vertices", "lightmap"])]
     points: Option<PathBuf>,
     /// All vertices of the scene, on the front of their triangles
-    #[arg(long)]
+    #[arg(long, conflicts_with = "points")]
     vertices: bool,
-    /// Table: .csv, .res (R G B a line) or .ply; may be repeated [default: CSV on standard output]
+    #[command(flatten)]
+    lightmap: lightmap::LightmapArgs,
+    /// Table: .csv, .res (R G B a line) or .ply; may be repeated [default: CSV on standard output]. Lightmap:
+    /// .exr, .hdr or .pfm.
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Quantity of the values
@@ -101,24 +107,24 @@ impl Bake {
     }
 
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
+        if let Some(run) = self.lightmap.run(self) {
+            return run;
+        }
         let mut outputs = Outputs::new(self.json);
         let tables = self.tables()?;
         tables.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
-        outputs.protect(&self.scene)?;
         let file = self.points.as_deref().filter(|file| *file != Path::new("-"));
         file.map_or(Ok(()), |file| outputs.protect(file))?;
         let mut budget = Budget::new(self.memory);
         let given = self.points.as_deref().map(|file| read_sensors(file, budget.left())).transpose()?;
         budget.take(given.as_ref().map_or(0, |sensors| size_of_val(&sensors[..])))?;
         let options = LoadOptions { memory: Some(budget.left()), ..LoadOptions::default() };
-        let loaded = load::load(&self.scene, &options)?;
-        loaded.files.iter().try_for_each(|file| outputs.protect(file))?;
-        loaded.repairs.iter().for_each(print_note);
+        let loaded = self.load(&outputs, &options)?;
         let (points, sensors) = match given {
             Some(sensors) => (sensors.iter().map(|sensor| sensor.point(&loaded)).collect(), sensors),
             None => vertices(&loaded),
         };
-        let baked = self.bake(&loaded, &points)?;
+        let baked = self.bake(&loaded, &points, self.memory)?;
         for (path, format) in &tables {
             outputs.save_table(path, |out| self.write(out, *format, &sensors, &baked));
         }
@@ -129,8 +135,16 @@ impl Bake {
             let table = String::from_utf8_lossy(&table);
             return Ok(outputs.end(table.trim_end(), code(&baked)));
         }
-        let results = if self.json { self.object(&baked, &tables).to_string() } else { self.text(&baked) };
+        let results = if self.json { self.object(&baked).to_string() } else { self.text(&baked) };
         Ok(outputs.end(&results, code(&baked)))
+    }
+
+    fn load(&self, outputs: &Outputs, options: &LoadOptions) -> Result<LoadedScene, Failure> {
+        outputs.protect(&self.scene)?;
+        let loaded = load::load(&self.scene, options)?;
+        loaded.files.iter().try_for_each(|file| outputs.protect(file))?;
+        loaded.repairs.iter().for_each(print_note);
+        Ok(loaded)
     }
 
     /// Files and formats of the tables.
@@ -143,7 +157,12 @@ impl Bake {
         self.output.iter().map(format).collect()
     }
 
-    fn bake(&self, loaded: &LoadedScene, points: &[IrradiancePoint]) -> Result<Baked, Failure> {
+    fn bake(
+        &self,
+        loaded: &LoadedScene,
+        points: &[IrradiancePoint],
+        memory: Option<usize>,
+    ) -> Result<Baked, Failure> {
         let views = loaded.views();
         let scene = views.scene(loaded.camera_or_default());
         let stop =
@@ -163,7 +182,8 @@ impl Bake {
             seed: self.seed,
             max_depth: self.max_depth.map(u32::from),
             threads: self.threads(),
-            memory: self.memory,
+            memory,
+            back_faces: self.has_back_faces(),
             ..BakeSettings::default()
         };
         interrupt::install_handler()?;
@@ -180,6 +200,20 @@ impl Bake {
         baked.map_err(|error| render_failure(&self.scene, &error))
     }
 
+    /// True if an output has the fractions of back faces.
+    fn has_back_faces(&self) -> bool {
+        let is_res = |path: &PathBuf| TableFormat::of(path) == Some(TableFormat::Res);
+        self.output.is_empty() || !self.output.iter().all(is_res)
+    }
+
+    fn quantity(&self) -> Quantity {
+        match self.unit {
+            Unit::Irradiance => Quantity::Irradiance,
+            Unit::White => Quantity::White,
+            Unit::Lux => Quantity::Lux,
+        }
+    }
+
     fn write(
         &self,
         out: &mut dyn std::io::Write,
@@ -187,15 +221,11 @@ impl Bake {
         sensors: &[Sensor],
         baked: &Baked,
     ) -> std::io::Result<()> {
-        let quantity = match self.unit {
-            Unit::Irradiance => Quantity::Irradiance,
-            Unit::White => Quantity::White,
-            Unit::Lux => Quantity::Lux,
-        };
-        write_table(out, (format, quantity), sensors, &baked.values)
+        let columns = (&baked.values[..], &baked.back_faces[..]);
+        write_table(out, (format, self.quantity()), sensors, columns)
     }
 
-    fn object(&self, baked: &Baked, tables: &[(PathBuf, TableFormat)]) -> Value {
+    fn object(&self, baked: &Baked) -> Value {
         let [build, sampling] = baked.seconds;
         let [tiles, finished] = baked.tiles;
         let mut samples: Vec<u32> = baked.values.iter().map(|value| value.samples).collect();
@@ -213,7 +243,7 @@ impl Bake {
             "paths": baked.counters.paths,
             "dropped": baked.counters.dropped.total(),
             "interrupted": baked.is_interrupted,
-            "outputs": tables.iter().map(|(path, _)| file_name(path)).collect::<Value>(),
+            "outputs": self.output.iter().map(|path| file_name(path)).collect::<Value>(),
         })
     }
 
@@ -232,4 +262,20 @@ impl Bake {
 
 fn code(baked: &Baked) -> ExitCode {
     if baked.is_interrupted { ExitCode::from(3) } else { ExitCode::SUCCESS }
+}
+
+/// Memory beside the scene.
+fn memory(bake: &Bake, loaded: &LoadedScene) -> Budget {
+    let views = loaded.views();
+    bake::budget(&views.scene(loaded.camera_or_default()), bake.memory)
+}
+
+/// Checks that there is an output: maps are no text.
+fn check_outputs(bake: &Bake, flag: &str, example: &str) -> Result<(), Failure> {
+    match bake.output.is_empty() {
+        true => {
+            Err(Failure::new(format!("{flag} has no output")).advice(format!("name one, as in {example}")))
+        }
+        false => Ok(()),
+    }
 }

@@ -22,6 +22,8 @@ pub(super) enum Role {
     Checkpoint,
     /// Table of `bake`.
     Table,
+    /// Map of `--error-map`.
+    ErrorMap,
     /// Irradiance caches of `--save-cache`.
     Cache,
     /// File of a report.
@@ -37,6 +39,7 @@ impl Role {
             Role::Picture | Role::Table => "-o",
             Role::Default => "the picture, without -o",
             Role::Checkpoint => "--checkpoint",
+            Role::ErrorMap => "--error-map",
             Role::Cache => "--save-cache",
             Role::Report => "--report",
             Role::Standard => "results and notes",
@@ -91,7 +94,7 @@ impl Outputs {
     pub(super) fn plan(&mut self, role: Role, path: &Path) -> Result<(), Failure> {
         match role {
             Role::Picture | Role::Default => save::check_writable(path)?,
-            Role::Checkpoint | Role::Cache | Role::Table => save::check_destination(path)?,
+            Role::Checkpoint | Role::Cache | Role::Table | Role::ErrorMap => save::check_destination(path)?,
             Role::Report | Role::Standard => {}
         }
         if Destination::of(path).is_ok_and(|destination| destination.is_stdout()) {

@@ -67,11 +67,14 @@ pub struct LoadOptions {
     pub textures: bool,
     /// Memory limit in bytes, temporary memory included; `None`: 80 % of the machine's memory.
     pub memory: Option<usize>,
+    /// True if the texture coordinates of the scene are to be those of the files, as charts of a lightmap.
+    /// Otherwise a transform that all maps of a material share is applied to them.
+    pub keeps_texcoords: bool,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { textures: true, memory: None }
+        Self { textures: true, memory: None, keeps_texcoords: false }
     }
 }
 
@@ -279,7 +282,7 @@ impl SceneBuilder {
         let mut textures = self.textures(options, environment.as_ref())?;
         let notes = &mut self.notes;
         let of_maps = |mtl: &mut MtlMaterial| {
-            let maps = mtl.maps.values_mut().filter(|map| map.found.is_some());
+            let maps = mtl.maps.values_mut().filter(|map| map.found.is_some() && !options.keeps_texcoords);
             Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
         };
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();

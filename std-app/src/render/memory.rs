@@ -206,7 +206,8 @@ impl<'m> MemorySource<'m> for Memory<'m> {
     }
 }
 
-fn scene_bytes(scene: &Scene) -> usize {
+/// Bytes of the buffers of a scene.
+pub(crate) fn scene_bytes(scene: &Scene) -> usize {
     let mesh = &scene.mesh;
     let textures = scene.textures.iter().map(|texture| match texture.texels {
         Texels::Srgb8(texels) | Texels::Linear8(texels) => size_of_val(texels),

@@ -6,6 +6,7 @@
 //! after which the render is resumed from its film file.
 
 mod audit;
+mod back_faces;
 mod built;
 mod deadline;
 mod environment_visibility;
@@ -45,6 +46,7 @@ pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Me
 pub use halflight_core::renderer::{Reconstruct, Stop, StopRule};
 pub use history::{Against, Round};
 pub use memory::MemoryUse;
+pub(crate) use memory::scene_bytes;
 pub use merge::{Merged, merge};
 pub use method::{MapView, PhotonView};
 pub(crate) use points::with_points;

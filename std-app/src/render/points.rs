@@ -1,5 +1,6 @@
 //! Irradiance at points on the threads of the program, with its rounds and stop rules.
 
+use super::back_faces::back_faces;
 use super::built::Built;
 use super::deadline::{Deadline, End};
 use super::memory::{Bank, Memory};
@@ -8,7 +9,7 @@ use super::{RenderError, Stop};
 use core::sync::atomic::AtomicBool;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::scene::Scene;
-use halflight_core::transport::Counters;
+use halflight_core::transport::{Counters, SceneContext};
 use halflight_core::{
     IrradiancePoint, IrradianceRenderer, Level, LightPart, PointIrradiance, PointSettings, Until,
 };
@@ -38,6 +39,8 @@ pub struct BakeSettings {
     pub memory: Option<usize>,
     /// Instruction set of the kernels.
     pub level: Level,
+    /// True if [`Baked::back_faces`] are counted.
+    pub back_faces: bool,
 }
 
 impl BakeSettings {
@@ -55,6 +58,7 @@ impl Default for BakeSettings {
             threads: None,
             memory: None,
             level: Level::detect(),
+            back_faces: false,
         }
     }
 }
@@ -77,6 +81,8 @@ pub struct BakeProgress {
 pub struct Baked {
     /// Values, in the order of the points.
     pub values: Vec<PointIrradiance>,
+    /// Fraction of the rays of each point that first meet the back of a surface; empty if not requested.
+    pub back_faces: Vec<f32>,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],
     /// Rays and rejected samples.
@@ -117,7 +123,7 @@ pub(crate) fn with_points(
     let bank = Bank::new();
     let mut memory = Memory::of_scene(scene, settings.memory, &bank);
     built.count_in(&mut memory)?;
-    let given = Footprint::default().slice::<IrradiancePoint>(points.len());
+    let given = Footprint::default().slice::<IrradiancePoint>(points.len()).slice::<f32>(points.len());
     memory.set_aside("given points", given)?;
     let mut lines = memory.take("points", IrradianceRenderer::footprint(points.len()))?;
     let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(settings.stop.seconds));
@@ -133,6 +139,9 @@ pub(crate) fn with_points(
     };
     let lights = built.lights.with_level(settings.level);
     let structures = (scene, built.bvh, lights);
+    let mut back_faces_of_points = vec![0.0; if settings.back_faces { points.len() } else { 0 }];
+    let context = SceneContext::new(scene, &built.bvh, &lights, settings.level);
+    back_faces(&context, points, &mut back_faces_of_points, &mut executor)?;
     let mut arena = Arena::over(&mut lines);
     let mut renderer = IrradianceRenderer::over(structures, points, &core, &mut arena, &mut executor)?;
 
@@ -166,6 +175,7 @@ pub(crate) fn with_points(
     }
     Ok(Baked {
         values: renderer.values().collect(),
+        back_faces: back_faces_of_points,
         tiles: renderer.tiles(),
         counters: renderer.counters(),
         seconds: [built.seconds(), start.elapsed().as_secs_f64()],

@@ -1,0 +1,96 @@
+//! Cells of a grid that take their values from known neighbours, ring by ring: texels of a map, probes.
+
+/// A grid of cells, the first axis fastest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Grid(pub(super) [usize; 3]);
+
+impl Grid {
+    /// Number of cells.
+    pub(super) fn len(&self) -> usize {
+        self.0.iter().product()
+    }
+
+    /// The column, row and slice of a cell.
+    pub(super) fn place(&self, cell: usize) -> [usize; 3] {
+        let [width, height, _] = self.0;
+        [cell % width, cell / width % height, cell / (width * height)]
+    }
+
+    /// The cells that touch `cell`.
+    fn neighbours(self, cell: usize) -> impl Iterator<Item = usize> {
+        let place = self.place(cell);
+        let steps = (0..27).map(|step| [step % 3, step / 3 % 3, step / 9]);
+        steps.filter_map(move |step| {
+            let at: [usize; 3] = core::array::from_fn(|axis| (place[axis] + step[axis]).wrapping_sub(1));
+            let is_inside = at != place && (0..3).all(|axis| at[axis] < self.0[axis]);
+            is_inside.then(|| at[0] + self.0[0] * (at[1] + self.0[1] * at[2]))
+        })
+    }
+
+    /// Makes unknown cells known in at most `rings` rings around the known ones: `take(cell, from)` is called
+    /// for each, with the known neighbours of which `may_take(cell, neighbour)` holds.
+    pub(super) fn fill(
+        self,
+        is_known: &mut [bool],
+        rings: usize,
+        may_take: impl Fn(usize, usize) -> bool,
+        mut take: impl FnMut(usize, &[usize]),
+    ) {
+        let may_take = &may_take;
+        let sources = |is_known: &[bool], cell: usize| {
+            let of_cell = self.neighbours(cell).filter(|&other| is_known[other] && may_take(cell, other));
+            of_cell.collect::<Vec<_>>()
+        };
+        let mut ring: Vec<usize> =
+            (0..self.len()).filter(|&cell| !is_known[cell] && !sources(is_known, cell).is_empty()).collect();
+        for _ in 0..rings {
+            for &cell in &ring {
+                take(cell, &sources(is_known, cell));
+            }
+            ring.iter().for_each(|&cell| is_known[cell] = true);
+            let around = |&cell: &usize| {
+                self.neighbours(cell).filter(move |&next| may_take(next, cell)).collect::<Vec<_>>()
+            };
+            ring = ring.iter().flat_map(around).filter(|&cell| !is_known[cell]).collect();
+            ring.sort_unstable();
+            ring.dedup();
+            if ring.is_empty() {
+                return;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values after a fill of a row of cells; the first known cell of each is its value.
+    fn filled(cells: &str, rings: usize, may_take: impl Fn(usize, usize) -> bool) -> String {
+        let mut values: Vec<char> = cells.chars().collect();
+        let mut is_known: Vec<bool> = values.iter().map(|value| *value != '.').collect();
+        let grid = Grid([values.len(), 1, 1]);
+        grid.fill(&mut is_known, rings, may_take, |cell, from| values[cell] = values[from[0]]);
+        values.into_iter().collect()
+    }
+
+    #[test]
+    fn nearest_known_cells_give_their_values() {
+        assert_eq!(filled("a....b...", 99, |_, _| true), "aaabbbbbb");
+        assert_eq!(filled("a....b...", 1, |_, _| true), "aa..bbb..");
+        assert_eq!(filled("a....b...", 0, |_, _| true), "a....b...");
+        assert_eq!(filled(".....", 9, |_, _| true), ".....");
+        // A border between the third and fourth cell.
+        assert_eq!(filled("a....b", 99, |to, from| (to < 3) == (from < 3)), "aaabbb");
+        assert_eq!(filled("a.....", 99, |to, from| (to < 3) == (from < 3)), "aaa...");
+    }
+
+    #[test]
+    fn neighbours_touch_in_all_axes() {
+        let grid = Grid([3, 4, 5]);
+        assert_eq!(grid.neighbours(0).count(), 7);
+        assert_eq!(grid.neighbours(1 + 3 * (1 + 4 * 2)).count(), 26);
+        let all = |cell: usize| grid.neighbours(cell).all(|other| grid.neighbours(other).any(|x| x == cell));
+        assert!((0..grid.len()).all(all));
+    }
+}

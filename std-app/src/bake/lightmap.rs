@@ -1,0 +1,281 @@
+//! Lightmaps: points of the texels of charts, and maps of their irradiances. Texels inside bodies take the
+//! values of near ones of their chart, and those around charts the values of their neighbours.
+
+use super::charts::{self, Charts, charts};
+use super::grid::Grid;
+use super::map::{Fetch, LightMap};
+use super::raster::{self, EMPTY, Raster, weights};
+use super::table::Quantity;
+use super::tilted::{linear, with_tilted};
+use crate::load::LoadedScene;
+use crate::memory::{Budget, Shortage};
+use crate::render::Baked;
+use crate::save::MAX_PIXELS;
+use core::fmt;
+use glam::{DVec2, Vec3};
+use halflight_core::IrradiancePoint;
+use halflight_core::scene::Scene;
+
+/// Fraction of back faces from which a point is inside a body, unless most points of the map are.
+const INSIDE: f32 = 0.5;
+
+/// Settings of a lightmap.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightmapSettings {
+    /// Name of the materials whose triangles have texels; `None`: all.
+    pub material: Option<String>,
+    /// Width and height in texels.
+    pub size: [u32; 2],
+    /// Points of each texel.
+    pub points: u32,
+    /// Rings of texels around charts that take the values of their neighbours.
+    pub padding: u32,
+    /// True if the irradiance of each texel is a linear function of the normal, from four normals.
+    pub directional: bool,
+}
+
+/// Texels of a lightmap and their points.
+#[derive(Debug)]
+pub struct Lightmap {
+    settings: LightmapSettings,
+    /// Chart of each texel, or [`EMPTY`].
+    charts: Vec<u32>,
+    chart_count: usize,
+    points: Vec<IrradiancePoint>,
+    /// Texel of each point, or of each four of them with four normals.
+    texels: Vec<u32>,
+    /// Sentences on doubtful charts.
+    pub notes: Vec<String>,
+}
+
+/// Reasons why there is no lightmap.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LightmapError {
+    /// No material has this name; those of the scene.
+    Material(String, Vec<String>),
+    /// The texture coordinates are no charts of a map.
+    Charts(String),
+    /// Texels whose centre lies in two triangles, and the texture coordinates of the first.
+    Overlaps(usize, [u64; 2]),
+    /// More texels than a picture can have.
+    Texels,
+    /// Insufficient memory.
+    Memory(Shortage),
+}
+
+impl fmt::Display for LightmapError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Material(name, _) => write!(f, "no material is called `{name}`"),
+            Self::Charts(why) => f.write_str(why),
+            Self::Overlaps(count, uv) => {
+                let [u, v] = uv.map(f64::from_bits);
+                write!(
+                    f,
+                    "charts overlap in {count} texels, the first at texture coordinates ({u:.4}, {v:.4})"
+                )
+            }
+            Self::Texels => write!(f, "the layers of the lightmap have more than {MAX_PIXELS} texels"),
+            Self::Memory(why) => write!(f, "the lightmap is too large: {why}"),
+        }
+    }
+}
+
+impl core::error::Error for LightmapError {}
+
+impl LightmapError {
+    /// The remedy.
+    pub fn advice(&self) -> String {
+        match self {
+            Self::Material(_, names) => format!("the materials are {}, or `all`", names.join(", ")),
+            Self::Charts(_) | Self::Overlaps(..) => {
+                "unwrap the mesh into one square without overlaps, as by \
+                 Lightmap Pack of Blender or by xatlas, or choose a material of it by --lightmap NAME"
+                    .into()
+            }
+            Self::Texels => "lower --size".into(),
+            Self::Memory(_) => "lower --size or --supersample, or raise --memory".into(),
+        }
+    }
+}
+
+impl Lightmap {
+    /// The texels of `loaded` and their points. Texels are taken from `budget`; the points are counted by
+    /// [`crate::bake::irradiance`].
+    ///
+    /// # Errors
+    /// No charts, charts that overlap or leave the unit square, insufficient memory.
+    pub fn new(
+        loaded: &LoadedScene,
+        settings: LightmapSettings,
+        budget: &mut Budget,
+    ) -> Result<Self, LightmapError> {
+        let texels = settings.size.map(|side| side as usize).iter().product::<usize>();
+        let layers = settings.layers();
+        if texels * layers > MAX_PIXELS {
+            return Err(LightmapError::Texels);
+        }
+        let bytes_of_texel = size_of::<u32>() + raster::BYTES_OF_TEXEL + LightMap::bytes_of_texel(layers);
+        let bytes = texels * bytes_of_texel + loaded.triangles.len() * charts::BYTES_OF_TRIANGLE;
+        budget.take(bytes).map_err(LightmapError::Memory)?;
+        let is_chosen = |name: &String| settings.material.as_ref().is_none_or(|chosen| chosen == name);
+        let chosen: Vec<bool> = loaded.material_names.iter().map(is_chosen).collect();
+        if !chosen.contains(&true) {
+            let name = settings.material.unwrap_or_default();
+            return Err(LightmapError::Material(name, loaded.material_names.clone()));
+        }
+        let of_scene = charts(loaded, |material| chosen[material as usize], settings.size)
+            .map_err(LightmapError::Charts)?;
+        let raster = Raster::new(&of_scene, settings.size);
+        let owners = raster.owners(DVec2::splat(0.5), |_, _| true);
+        if let Some((count, [x, y])) = owners.overlaps {
+            let [width, height] = settings.size.map(f64::from);
+            let uv = [(x as f64 + 0.5) / width, 1.0 - (y as f64 + 0.5) / height];
+            return Err(LightmapError::Overlaps(count, uv.map(f64::to_bits)));
+        }
+        let notes = notes(&of_scene, owners.shared);
+        let mut charts = owners.triangles;
+        for owner in charts.iter_mut().filter(|owner| **owner != EMPTY) {
+            *owner = of_scene.triangles[*owner as usize].chart;
+        }
+        let used = charts.iter().filter(|chart| **chart != EMPTY).count() * settings.points as usize;
+        budget.take(used * size_of::<u32>()).map_err(LightmapError::Memory)?;
+        budget.has(used * layers * size_of::<IrradiancePoint>()).map_err(LightmapError::Memory)?;
+        let (points, texels) = (Vec::with_capacity(used * layers), Vec::with_capacity(used));
+        let mut map = Self { settings, charts, chart_count: of_scene.count, points, texels, notes };
+        map.place(loaded, &of_scene);
+        Ok(map)
+    }
+
+    /// Adds the points of all texels, spread evenly over each (Hammersley 1960).
+    fn place(&mut self, loaded: &LoadedScene, charts: &Charts) {
+        let views = loaded.views();
+        let scene = views.scene(loaded.camera_or_default());
+        let raster = Raster::new(charts, self.settings.size);
+        let count = self.settings.points;
+        for number in 0..count {
+            let across = (f64::from(number) + 0.5) / f64::from(count);
+            let down = f64::from(number.reverse_bits()) / 2f64.powi(32);
+            let offset = DVec2::new(across, down + 0.5 / f64::from(count.next_power_of_two()));
+            let owners = raster.owners(offset, |texel, chart| self.charts[texel] == chart);
+            let width = self.settings.size[0] as usize;
+            for (texel, owner) in owners.triangles.into_iter().enumerate() {
+                let Some(triangle) = charts.triangles.get(owner as usize) else { continue };
+                let place = DVec2::new((texel % width) as f64, (texel / width) as f64) + offset;
+                self.add(&scene, texel as u32, (triangle.triangle, weights(triangle, place)));
+            }
+        }
+    }
+
+    /// Adds a point of a texel on the front of a triangle, by its normals.
+    fn add(&mut self, scene: &Scene, texel: u32, (triangle, weights): (u32, [f32; 2])) {
+        let Some(point) = IrradiancePoint::on_triangle(scene, triangle, weights, true) else { return };
+        self.texels.push(texel);
+        match self.settings.directional {
+            true => {
+                let normals = with_tilted(point.normal.into());
+                self.points.extend(normals.map(|n| IrradiancePoint { normal: n.to_array(), ..point }));
+            }
+            false => self.points.push(point),
+        }
+    }
+
+    /// The points at which irradiance is to be estimated.
+    pub fn points(&self) -> &[IrradiancePoint] {
+        &self.points
+    }
+
+    /// Number of charts.
+    pub fn charts(&self) -> usize {
+        self.chart_count
+    }
+
+    /// The map of `baked` irradiances of the points.
+    pub fn map(&self, baked: &Baked, quantity: Quantity) -> LightMap {
+        let layers = self.settings.layers();
+        let mut map = LightMap::empty(self.settings.size, layers);
+        let is_valid = self.valid(&baked.back_faces);
+        let mut counts = vec![0u32; self.charts.len()];
+        for (bundle, &texel) in self.texels.iter().enumerate().filter(|(bundle, _)| is_valid[*bundle]) {
+            let of_bundle = bundle * layers..(bundle + 1) * layers;
+            let (values, points) = (&baked.values[of_bundle.clone()], &self.points[of_bundle]);
+            let fetch = match (values, points) {
+                ([a, b, c, d], [e, f, g, h]) => {
+                    let irradiances = [a, b, c, d].map(|value| value.irradiance.to_array());
+                    directional([e, f, g, h].map(|point| point.normal.into()), irradiances)
+                }
+                _ => [values[0].irradiance.to_array(); 4],
+            };
+            let half_width = values[0].upper - values[0].value();
+            map.add(texel as usize, &fetch, half_width);
+            counts[texel as usize] += 1;
+        }
+        map.divide(&counts, quantity.scale());
+        self.spread(&mut map, &counts);
+        map
+    }
+
+    /// Fills texels inside bodies, and those around charts.
+    fn spread(&self, map: &mut LightMap, counts: &[u32]) {
+        let [width, height] = self.settings.size.map(|side| side as usize);
+        let grid = Grid([width, height, 1]);
+        let mut is_known: Vec<bool> = counts.iter().map(|count| *count > 0).collect();
+        let is_of_chart =
+            |to: usize, from: usize| self.charts[to] != EMPTY && self.charts[to] == self.charts[from];
+        grid.fill(&mut is_known, usize::MAX, is_of_chart, |texel, from| map.take(texel, from));
+        grid.fill(
+            &mut is_known,
+            self.settings.padding as usize,
+            |_, _| true,
+            |texel, from| {
+                map.take(texel, from);
+            },
+        );
+    }
+
+    /// False for each bundle that is inside a body. Scenes whose walls show their backs are not inside one,
+    /// and no more are charts without a bundle outside.
+    fn valid(&self, back_faces: &[f32]) -> Vec<bool> {
+        let shares: Vec<f32> = back_faces.iter().step_by(self.settings.layers()).copied().collect();
+        let mut sorted = shares.clone();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let is_inverted = sorted.get(sorted.len() / 2).is_some_and(|median| *median > INSIDE);
+        let is_outside = |share: &f32| is_inverted || *share <= INSIDE;
+        let chart = |bundle: usize| self.charts[self.texels[bundle] as usize] as usize;
+        let mut has_outside = vec![false; self.chart_count];
+        for (bundle, share) in shares.iter().enumerate() {
+            has_outside[chart(bundle)] |= is_outside(share);
+        }
+        let is_valid = |(bundle, share)| is_outside(share) || !has_outside[chart(bundle)];
+        shares.iter().enumerate().map(is_valid).collect()
+    }
+}
+
+impl LightmapSettings {
+    fn layers(&self) -> usize {
+        if self.directional { 4 } else { 1 }
+    }
+}
+
+/// Constant and gradient of irradiance by its values at the normals of [`with_tilted`].
+fn directional(normals: [Vec3; 4], irradiances: [[f32; 3]; 4]) -> Fetch {
+    let mut fetch = Fetch::default();
+    for channel in 0..3 {
+        let (constant, slope) = linear(normals, irradiances.map(|irradiance| irradiance[channel]));
+        let all = [constant, slope.x, slope.y, slope.z];
+        fetch.iter_mut().zip(all).for_each(|(layer, value)| layer[channel] = value);
+    }
+    fetch
+}
+
+/// Sentences on charts that are usable with a loss.
+fn notes(charts: &Charts, shared: usize) -> Vec<String> {
+    let flat = (charts.flat > 0)
+        .then(|| format!("{} triangles have no area in texture coordinates and get no texels", charts.flat));
+    let shared = (shared > 0).then(|| {
+        format!(
+            "charts are so near that fetches in two of them read the same {shared} texels: leave 2 texels"
+        )
+    });
+    [flat, shared].into_iter().flatten().collect()
+}

@@ -1,0 +1,159 @@
+//! Conservative rasterisation of charts (Hasselgren et al. 2005), in f64: the texels that a bilinear fetch
+//! inside a chart reads, each with the triangle at its centre or nearest to it.
+
+use super::charts::{ChartTriangle, Charts};
+use glam::DVec2;
+
+/// No triangle.
+pub(super) const EMPTY: u32 = u32::MAX;
+
+/// Half the side of the square around the centre of a texel in which a bilinear fetch reads it.
+const REACH: f64 = 1.0;
+
+/// Bytes of a texel while a map is rasterised.
+pub(super) const BYTES_OF_TEXEL: usize = size_of::<u32>() + size_of::<f64>() + 1;
+
+/// Charts in texels.
+pub(super) struct Raster<'a> {
+    charts: &'a Charts,
+    size: [usize; 2],
+}
+
+/// The triangles of all texels.
+pub(super) struct Owners {
+    /// Index of the triangle of each texel in [`Charts::triangles`], or [`EMPTY`].
+    pub(super) triangles: Vec<u32>,
+    /// Texels that fetches inside two charts read.
+    pub(super) shared: usize,
+    /// Texels whose centre lies in two triangles, and the first of these.
+    pub(super) overlaps: Option<(usize, [usize; 2])>,
+}
+
+impl<'a> Raster<'a> {
+    pub(super) fn new(charts: &'a Charts, size: [u32; 2]) -> Self {
+        Self { charts, size: size.map(|side| side as usize) }
+    }
+
+    /// The triangle at or nearest to the point at `offset` (0 to 1) in each texel, among the triangles of
+    /// charts that `may_own(texel, chart)`.
+    pub(super) fn owners(&self, offset: DVec2, may_own: impl Fn(usize, u32) -> bool) -> Owners {
+        let [width, height] = self.size;
+        let triangles = &self.charts.triangles;
+        let mut owners = vec![EMPTY; width * height];
+        let mut distances = vec![f64::INFINITY; width * height];
+        let mut is_shared = vec![false; width * height];
+        let mut overlaps: Option<(usize, [usize; 2])> = None;
+        for (number, triangle) in (0..).zip(triangles) {
+            self.for_texels(triangle, |[x, y]| {
+                let texel = y * width + x;
+                if !may_own(texel, triangle.chart) {
+                    return;
+                }
+                let point = DVec2::new(x as f64, y as f64) + offset;
+                let distance = distance(triangle, point);
+                let owner = owners[texel];
+                if owner != EMPTY {
+                    is_shared[texel] |= triangles[owner as usize].chart != triangle.chart;
+                    if distance == 0.0 && distances[texel] == 0.0 {
+                        overlaps.get_or_insert((0, [x, y])).0 += 1;
+                    }
+                }
+                if distance < distances[texel] {
+                    (owners[texel], distances[texel]) = (number, distance);
+                }
+            });
+        }
+        let shared = is_shared.into_iter().filter(|is_shared| *is_shared).count();
+        Owners { triangles: owners, shared, overlaps }
+    }
+
+    /// Calls `visit` with the texels that a fetch inside `triangle` reads, row by row.
+    fn for_texels(&self, triangle: &ChartTriangle, mut visit: impl FnMut([usize; 2])) {
+        let [a, b, c] = triangle.corners;
+        for y in reached([a.min(b).min(c).y, a.max(b).max(c).y], self.size[1]) {
+            let centre = y as f64 + 0.5;
+            for x in reached(extent(&triangle.corners, [centre - REACH, centre + REACH]), self.size[0]) {
+                visit([x, y]);
+            }
+        }
+    }
+}
+
+/// The texels of a side whose centres are nearer than [`REACH`] to an interval.
+fn reached([low, high]: [f64; 2], side: usize) -> core::ops::Range<usize> {
+    let first = (low - 0.5 - REACH).floor() + 1.0;
+    let end = (high - 0.5 + REACH).ceil();
+    // Casts of numbers below 0 give 0.
+    first as usize..(end as usize).min(side)
+}
+
+/// Lowest and highest x of a triangle between two rows.
+fn extent(corners: &[DVec2; 3], [low, high]: [f64; 2]) -> [f64; 2] {
+    let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
+    for i in 0..3 {
+        let (a, b) = (corners[i], corners[(i + 1) % 3]);
+        let [start, end] = match a.y == b.y {
+            true if (low..=high).contains(&a.y) => [0.0, 1.0],
+            true => continue,
+            false => [low, high].map(|y| (y - a.y) / (b.y - a.y)),
+        };
+        let (start, end) = (start.min(end).max(0.0), start.max(end).min(1.0));
+        for part in [start, end].into_iter().filter(|_| start <= end) {
+            let x = a.x + part * (b.x - a.x);
+            extent = [extent[0].min(x), extent[1].max(x)];
+        }
+    }
+    extent
+}
+
+/// Square of the distance from a point to a triangle; 0 inside.
+fn distance(triangle: &ChartTriangle, point: DVec2) -> f64 {
+    match is_inside(triangle, point) {
+        true => 0.0,
+        // A point on a border that is not its own is outside.
+        false => nearest_on_border(&triangle.corners, point).distance_squared(point).max(f64::MIN_POSITIVE),
+    }
+}
+
+/// True if a point is in a triangle. On a common edge it is in one of the triangles alone.
+fn is_inside(triangle: &ChartTriangle, point: DVec2) -> bool {
+    let [a, b, c] = triangle.corners;
+    let edges = if triangle.area() > 0.0 { [(a, b), (b, c), (c, a)] } else { [(a, c), (c, b), (b, a)] };
+    edges.into_iter().all(|edge| is_left(edge, point))
+}
+
+/// True if a point is to the left of an edge. Both directions of an edge give opposite results, also on it.
+fn is_left((a, b): (DVec2, DVec2), point: DVec2) -> bool {
+    let is_ascending = a.to_array() < b.to_array();
+    let (low, high) = if is_ascending { (a, b) } else { (b, a) };
+    ((high - low).perp_dot(point - low) >= 0.0) == is_ascending
+}
+
+/// Weights of the second and third corner at the point of a triangle that is nearest to `point`, which is
+/// kept off the border, where other surfaces begin.
+pub(super) fn weights(triangle: &ChartTriangle, point: DVec2) -> [f32; 2] {
+    let [a, b, c] = triangle.corners;
+    let nearest = match is_inside(triangle, point) {
+        true => point,
+        false => nearest_on_border(&triangle.corners, point),
+    };
+    let part = |from: DVec2, to: DVec2| (from - nearest).perp_dot(to - nearest) / triangle.area();
+    let weights = [part(b, c), part(c, a), part(a, b)].map(|weight| weight.max(LEAST_WEIGHT));
+    let sum: f64 = weights.iter().sum();
+    [weights[1], weights[2]].map(|weight| (weight / sum) as f32)
+}
+
+/// Least weight of a corner at a point of a triangle.
+const LEAST_WEIGHT: f64 = 1e-4;
+
+fn nearest_on_border(corners: &[DVec2; 3], point: DVec2) -> DVec2 {
+    let on_edge = |i: usize| {
+        let (a, along) = (corners[i], corners[(i + 1) % 3] - corners[i]);
+        a + ((point - a).dot(along) / along.length_squared()).clamp(0.0, 1.0) * along
+    };
+    let [first, second, third] = [0, 1, 2].map(on_edge);
+    let nearer = |a: DVec2, b: DVec2| {
+        if b.distance_squared(point) < a.distance_squared(point) { b } else { a }
+    };
+    nearer(nearer(first, second), third)
+}
