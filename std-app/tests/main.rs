@@ -18,6 +18,7 @@ mod picture_files;
 mod pictures;
 #[cfg(unix)]
 mod pipes;
+mod probes;
 #[cfg(target_os = "linux")]
 mod process;
 mod reconstruction;

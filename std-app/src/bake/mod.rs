@@ -3,9 +3,13 @@
 
 mod charts;
 mod grid;
+mod harmonics;
+mod ktx2;
 mod lightmap;
 mod map;
 mod points;
+mod probe_files;
+mod probes;
 mod raster;
 mod table;
 mod tilted;
@@ -14,6 +18,8 @@ pub use crate::render::{BakeProgress, BakeSettings, Baked};
 pub use lightmap::{Lightmap, LightmapError, LightmapSettings};
 pub use map::{LightMap, Texel, check as check_format};
 pub use points::{Sensor, read_sensors, vertices};
+pub use probe_files::{ProbeFormat, write_probes};
+pub use probes::{Probe, ProbeGrid, ProbeSettings};
 pub use table::{Quantity, TableFormat, write_table};
 
 use crate::memory::Budget;

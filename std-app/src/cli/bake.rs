@@ -1,6 +1,7 @@
 //! `halflight bake`: irradiance at points, each with its interval.
 
 mod lightmap;
+mod probes;
 
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
@@ -25,24 +26,26 @@ use std::process::ExitCode;
 
 /// Estimate irradiance at points, each with its 95 % interval
 ///
-/// Points are the sensors of a grid, a line `x y z nx ny nz` each, the vertices of the scene, or the texels
-/// of a lightmap. A sensor that lies on a surface within rounding is put on it, on the side of its normal.
-/// The first of --spp, --time and --error that holds ends the work; without one it ends when the intervals
-/// are 2 %, or after 60 s.
+/// Points are the sensors of a grid, a line `x y z nx ny nz` each, the vertices of the scene, the texels of
+/// a lightmap, or light probes. A sensor that lies on a surface within rounding is put on it, on the side of
+/// its normal. The first of --spp, --time and --error that holds ends the work; without one it ends when the
+/// intervals are 2 %, or after 60 s.
 #[derive(Args)]
 pub(super) struct Bake {
     /// Scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
     /// Sensors, a line `x y z nx ny nz` each; `-` is standard input
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["vertices", "lightmap"])]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["vertices", "lightmap", "probes"])]
     points: Option<PathBuf>,
     /// All vertices of the scene, on the front of their triangles
     #[arg(long, conflicts_with = "points")]
     vertices: bool,
     #[command(flatten)]
     lightmap: lightmap::LightmapArgs,
+    #[command(flatten)]
+    probes: probes::ProbeArgs,
     /// Table: .csv, .res (R G B a line) or .ply; may be repeated [default: CSV on standard output]. Lightmap:
-    /// .exr, .hdr or .pfm.
+    /// .exr, .hdr or .pfm. Probes: .json, .csv or .ktx2
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Quantity of the values
@@ -107,7 +110,7 @@ impl Bake {
     }
 
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
-        if let Some(run) = self.lightmap.run(self) {
+        if let Some(run) = self.lightmap.run(self).or_else(|| self.probes.run(self)) {
             return run;
         }
         let mut outputs = Outputs::new(self.json);
@@ -270,7 +273,7 @@ fn memory(bake: &Bake, loaded: &LoadedScene) -> Budget {
     bake::budget(&views.scene(loaded.camera_or_default()), bake.memory)
 }
 
-/// Checks that there is an output: maps are no text.
+/// Checks that there is an output: maps and probes are no text.
 fn check_outputs(bake: &Bake, flag: &str, example: &str) -> Result<(), Failure> {
     match bake.output.is_empty() {
         true => {

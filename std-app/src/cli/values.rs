@@ -48,6 +48,23 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     size.ok_or("width and height are expected, as in 640x480; at most 2^20 a side and 2^28 pixels".into())
 }
 
+/// Number of probes along each axis, `NXxNYxNZ`.
+pub(super) fn grid(text: &str) -> Result<[u32; 3], String> {
+    let sides = text.split(['x', 'X']).map(|side| side.parse().ok().filter(|side| *side > 0));
+    let grid = sides.collect::<Option<Vec<u32>>>().and_then(|sides| sides.try_into().ok());
+    grid.ok_or("three numbers of probes are expected, as in 8x4x8".into())
+}
+
+/// Box `X0,Y0,Z0,X1,Y1,Z1`: two corners.
+pub(super) fn bounds(text: &str) -> Result<[[f64; 3]; 2], String> {
+    let number = |text| checked::<f64, Number>(text).map(f64::from);
+    let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    match numbers[..] {
+        [a, b, c, d, e, f] if a < d && b < e && c < f => Ok([[a, b, c], [d, e, f]]),
+        _ => Err("a lower and a higher corner are expected, as in -1,0,-1,1,2,1".into()),
+    }
+}
+
 /// Time in seconds: `30s`, `2m`, `1.5h`, `250ms`, or a number of seconds.
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];

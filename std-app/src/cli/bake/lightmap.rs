@@ -17,7 +17,7 @@ use std::process::ExitCode;
 const PADDING: u32 = 4;
 
 /// Subjects of other runs. clap drops a requirement that conflicts with another flag.
-const OTHERS: [&str; 2] = ["points", "vertices"];
+const OTHERS: [&str; 3] = ["points", "vertices", "probes"];
 
 #[derive(Args)]
 pub(super) struct LightmapArgs {

@@ -1,0 +1,73 @@
+//! Spherical harmonics of radiance from irradiances by a bundle of normals (Ramamoorthi and Hanrahan 2001).
+
+use core::f32::consts::{FRAC_PI_4, PI};
+use glam::Vec3;
+
+/// Coordinates of a point whose images under the rotations of a cube are a spherical 7-design (McLaren 1963):
+/// sums over them integrate polynomials of degree 7. Their squares are the roots of z³ - z² + z/5 - 1/105.
+const DESIGN: [f32; 3] = [0.266_635_4, 0.422_518_65, 0.866_246_8];
+
+/// The 24 normals of a spherical 7-design.
+pub(super) fn design() -> [Vec3; 24] {
+    const PERMUTATIONS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+    core::array::from_fn(|number| {
+        let (permutation, signs) = (number / 4, number % 4);
+        // Rotations have even permutations with an even number of signs, and odd ones with an odd number.
+        let last = (signs ^ signs >> 1) & 1 ^ usize::from(permutation >= 3);
+        let negative = [signs & 1, signs >> 1, last];
+        let axis = |i: usize| DESIGN[PERMUTATIONS[permutation][i]] * [1.0, -1.0][negative[i]];
+        Vec3::new(axis(0), axis(1), axis(2)).normalize()
+    })
+}
+
+/// The six directions of the axes: +x, -x, +y, -y, +z, -z.
+pub(super) const AXES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+
+/// Real spherical harmonics to degree 2, in the order 1, y, z, x, xy, yz, 3z² - 1, xz, x² - y².
+pub(super) fn harmonics(Vec3 { x, y, z }: Vec3) -> [f32; 9] {
+    let quadratic = [x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y];
+    let scales = [1.092_548_4, 1.092_548_4, 0.315_391_57, 1.092_548_4, 0.546_274_2];
+    let linear = [y, z, x].map(|axis| 0.488_602_52 * axis);
+    core::array::from_fn(|i| match i {
+        0 => 0.282_094_8,
+        1..4 => linear[i - 1],
+        _ => scales[i - 4] * quadratic[i - 4],
+    })
+}
+
+/// Factors of the harmonics of radiance that give those of irradiance.
+pub(super) const COSINE: [f32; 9] = {
+    const LINEAR: f32 = 2.0 * PI / 3.0;
+    [PI, LINEAR, LINEAR, LINEAR, FRAC_PI_4, FRAC_PI_4, FRAC_PI_4, FRAC_PI_4, FRAC_PI_4]
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean of x^a y^b z^c over the sphere: 0 with an odd exponent.
+    fn mean(exponents: [i32; 3]) -> f64 {
+        let odd = |n: i32| (1..n).step_by(2).map(f64::from).product::<f64>();
+        match exponents.iter().all(|exponent| exponent % 2 == 0) {
+            true => exponents.map(odd).iter().product::<f64>() / odd(exponents.iter().sum::<i32>() + 2),
+            false => 0.0,
+        }
+    }
+
+    #[test]
+    fn the_design_integrates_polynomials_of_degree_seven() {
+        for (a, b, c) in (0..512).map(|i| (i % 8, i / 8 % 8, i / 64)).filter(|(a, b, c)| a + b + c <= 7) {
+            let value = |n: Vec3| n.as_dvec3().x.powi(a) * n.as_dvec3().y.powi(b) * n.as_dvec3().z.powi(c);
+            let sum: f64 = design().into_iter().map(value).sum();
+            assert!((sum / 24.0 - mean([a, b, c])).abs() < 1e-6, "{a} {b} {c}");
+        }
+    }
+
+    #[test]
+    fn harmonics_are_orthonormal() {
+        for (i, j) in (0..81).map(|pair| (pair / 9, pair % 9)) {
+            let sum: f32 = design().iter().map(|n| harmonics(*n)[i] * harmonics(*n)[j]).sum();
+            assert!((4.0 * PI / 24.0 * sum - f32::from(u8::from(i == j))).abs() < 1e-5, "{i} {j}");
+        }
+    }
+}
