@@ -184,6 +184,26 @@ fn a_directional_map_is_linear_in_the_normal() {
 }
 
 #[test]
+fn meshes_of_a_scene_have_maps_of_their_own() {
+    let folder = floor();
+    let quad =
+        "v 0 0.5 2\nv 1 0.5 2\nv 1 0.5 1\nv 0 0.5 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    std::fs::write(folder.path("shelf.obj"), quad).unwrap();
+    let meshes = "[[mesh]]\nfile = \"scene.obj\"\n[[mesh]]\nfile = \"shelf.obj\"\n";
+    std::fs::write(folder.path("both.toml"), meshes).unwrap();
+    let said = folder.refused("bake both.toml --lightmap all --size 8x8 -o a.exr");
+    assert!(said.contains("charts overlap in 64 texels"), "{said}");
+    folder.object("bake both.toml --lightmap shelf --size 8x8 --spp 256 --light direct -o shelf.exr --json");
+    folder.object("bake both.toml --lightmap grey --size 8x8 --spp 256 --light direct -o floor.exr --json");
+    let mean = |name: &str| {
+        let map = Map::read(&folder, name);
+        map.texels.iter().map(|texel| f64::from(texel[0])).sum::<f64>() / 64.0
+    };
+    // The shelf has no material of its own, and is not below the lamp.
+    assert!(mean("shelf.exr") > 0.001 && mean("shelf.exr") < 0.5 * mean("floor.exr"));
+}
+
+#[test]
 fn texels_below_a_box_take_the_light_beside_it() {
     // A lamp over the whole floor, and a closed box on the middle of it.
     let mut mesh = "v 0 0 2\nv 2 0 2\nv 2 0 0\nv 0 0 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
@@ -257,7 +277,7 @@ fn maps_that_cannot_be_are_refused_before_the_work() {
         ),
         ("scene.obj --lightmap all --size 8x8 -o a.png", "a.png: a PNG has no room for light"),
         ("scene.obj --lightmap all --size 8x8 --directional -o a.hdr", "an HDR has no negative values"),
-        ("scene.obj --lightmap wall --size 8x8 -o a.exr", "no material is called `wall`"),
+        ("scene.obj --lightmap wall --size 8x8 -o a.exr", "no mesh or material is called `wall`"),
         ("scene.obj --lightmap all --size 16384x16384 -o a.exr --memory 1G", "the lightmap is too large"),
         ("scene.obj --lightmap all --size 16384x16384 -o a.exr --directional", "more than 268435456 texels"),
         ("scene.obj --lightmap all --size 8x8", "--lightmap has no output"),

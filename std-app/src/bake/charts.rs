@@ -2,6 +2,7 @@
 
 use crate::load::LoadedScene;
 use glam::DVec2;
+use halflight_core::scene::Triangle;
 use std::collections::HashMap;
 
 /// Rounding of texture coordinates of a file, by which a chart may leave the unit square.
@@ -39,13 +40,13 @@ pub(super) struct Charts {
 /// Bytes of a triangle while charts are found.
 pub(super) const BYTES_OF_TRIANGLE: usize = size_of::<ChartTriangle>() + 3 * 48;
 
-/// The charts of the triangles whose material `is_chosen`, in a map of `size` texels.
+/// The charts of the triangles that `is_chosen`, in a map of `size` texels.
 ///
 /// # Errors
 /// A sentence if there are no charts, or if some leave the unit square.
 pub(super) fn charts(
     loaded: &LoadedScene,
-    is_chosen: impl Fn(u32) -> bool,
+    is_chosen: impl Fn(&Triangle) -> bool,
     size: [u32; 2],
 ) -> Result<Charts, String> {
     if loaded.texcoords.is_empty() {
@@ -56,7 +57,7 @@ pub(super) fn charts(
     let mut corners_of = Vec::new();
     let mut outside: Option<(usize, String)> = None;
     for (number, triangle) in (0..).zip(&loaded.triangles) {
-        if !is_chosen(triangle.material) {
+        if !is_chosen(triangle) {
             continue;
         }
         let uv =

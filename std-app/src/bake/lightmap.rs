@@ -12,9 +12,10 @@ use crate::memory::{Budget, Shortage};
 use crate::render::Baked;
 use crate::save::MAX_PIXELS;
 use core::fmt;
+use core::ops::Range;
 use glam::{DVec2, Vec3};
 use halflight_core::IrradiancePoint;
-use halflight_core::scene::Scene;
+use halflight_core::scene::{Scene, Triangle};
 
 /// Fraction of back faces from which a point is inside a body, unless most points of the map are.
 const INSIDE: f32 = 0.5;
@@ -22,8 +23,8 @@ const INSIDE: f32 = 0.5;
 /// Settings of a lightmap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightmapSettings {
-    /// Name of the materials whose triangles have texels; `None`: all.
-    pub material: Option<String>,
+    /// Name of the meshes or materials whose triangles have texels; `None`: all.
+    pub subject: Option<String>,
     /// Width and height in texels.
     pub size: [u32; 2],
     /// Points of each texel.
@@ -51,8 +52,8 @@ pub struct Lightmap {
 /// Reasons why there is no lightmap.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LightmapError {
-    /// No material has this name; those of the scene.
-    Material(String, Vec<String>),
+    /// No mesh or material has this name; those of the scene.
+    Subject(String, Vec<String>),
     /// The texture coordinates are no charts of a map.
     Charts(String),
     /// Texels whose centre lies in two triangles, and the texture coordinates of the first.
@@ -66,7 +67,7 @@ pub enum LightmapError {
 impl fmt::Display for LightmapError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Material(name, _) => write!(f, "no material is called `{name}`"),
+            Self::Subject(name, _) => write!(f, "no mesh or material is called `{name}`"),
             Self::Charts(why) => f.write_str(why),
             Self::Overlaps(count, uv) => {
                 let [u, v] = uv.map(f64::from_bits);
@@ -87,10 +88,10 @@ impl LightmapError {
     /// The remedy.
     pub fn advice(&self) -> String {
         match self {
-            Self::Material(_, names) => format!("the materials are {}, or `all`", names.join(", ")),
+            Self::Subject(_, names) => format!("the names are all, {}", names.join(", ")),
             Self::Charts(_) | Self::Overlaps(..) => {
                 "unwrap the mesh into one square without overlaps, as by \
-                 Lightmap Pack of Blender or by xatlas, or choose a material of it by --lightmap NAME"
+                 Lightmap Pack of Blender or by xatlas, or choose a mesh or material by --lightmap NAME"
                     .into()
             }
             Self::Texels => "lower --size".into(),
@@ -118,14 +119,8 @@ impl Lightmap {
         let bytes_of_texel = size_of::<u32>() + raster::BYTES_OF_TEXEL + LightMap::bytes_of_texel(layers);
         let bytes = texels * bytes_of_texel + loaded.triangles.len() * charts::BYTES_OF_TRIANGLE;
         budget.take(bytes).map_err(LightmapError::Memory)?;
-        let is_chosen = |name: &String| settings.material.as_ref().is_none_or(|chosen| chosen == name);
-        let chosen: Vec<bool> = loaded.material_names.iter().map(is_chosen).collect();
-        if !chosen.contains(&true) {
-            let name = settings.material.unwrap_or_default();
-            return Err(LightmapError::Material(name, loaded.material_names.clone()));
-        }
-        let of_scene = charts(loaded, |material| chosen[material as usize], settings.size)
-            .map_err(LightmapError::Charts)?;
+        let is_chosen = chosen(loaded, settings.subject.as_deref())?;
+        let of_scene = charts(loaded, is_chosen, settings.size).map_err(LightmapError::Charts)?;
         let raster = Raster::new(&of_scene, settings.size);
         let owners = raster.owners(DVec2::splat(0.5), |_, _| true);
         if let Some((count, [x, y])) = owners.overlaps {
@@ -255,6 +250,26 @@ impl LightmapSettings {
     fn layers(&self) -> usize {
         if self.directional { 4 } else { 1 }
     }
+}
+
+/// True for triangles of the meshes or materials of this name; `None`: all.
+fn chosen<'a>(
+    loaded: &'a LoadedScene,
+    subject: Option<&'a str>,
+) -> Result<impl Fn(&Triangle) -> bool + 'a, LightmapError> {
+    let LoadedScene { meshes, material_names, .. } = loaded;
+    let mut names = meshes.iter().map(|(name, _)| name).chain(material_names);
+    if let Some(subject) = subject.filter(|subject| !names.any(|name| name == subject)) {
+        let names = meshes.iter().map(|(name, _)| name).chain(material_names).cloned().collect();
+        return Err(LightmapError::Subject(subject.to_owned(), names));
+    }
+    Ok(move |triangle: &Triangle| {
+        let is_of_mesh = |(name, vertices): &(String, Range<u32>)| {
+            subject == Some(name) && vertices.contains(&triangle.vertices[0])
+        };
+        let material = material_names[triangle.material as usize].as_str();
+        subject.is_none_or(|subject| subject == material) || meshes.iter().any(is_of_mesh)
+    })
 }
 
 /// Constant and gradient of irradiance by its values at the normals of [`with_tilted`].

@@ -9,4 +9,6 @@ pub(super) struct Geometry {
     pub(super) normals: Vec<[f32; 3]>,
     pub(super) texcoords: Vec<[f32; 2]>,
     pub(super) triangles: Vec<Triangle>,
+    /// Number of vertices up to the end of each part.
+    pub(super) ends: Vec<u32>,
 }

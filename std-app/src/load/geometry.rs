@@ -34,6 +34,7 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
         all.texcoords.extend(part.texcoords);
         let moved = |t: Triangle| Triangle { vertices: t.vertices.map(|v| v + first), ..t };
         all.triangles.extend(part.triangles.into_iter().map(moved));
+        all.ends.push(all.positions.len() as u32);
         notes.merge(of_part);
     }
     all

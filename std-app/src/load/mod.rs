@@ -47,6 +47,7 @@ pub use texture_set::TextureSet;
 pub use transform::{SceneTransform, direction};
 
 use crate::memory::{self, Budget, Shortage};
+use core::ops::Range;
 use files::Lookup;
 use halflight_core::scene::{Environment, Material};
 use library::{Library, Sources};
@@ -133,6 +134,7 @@ struct SceneBuilder {
 }
 
 struct PlacedMesh {
+    name: String,
     obj: usize,
     placement: Placement,
     /// Index into the materials of the scene for each material of the OBJ, and last for faces without
@@ -184,7 +186,8 @@ impl SceneBuilder {
             }
             None => self.own_materials(number, path),
         };
-        self.meshes.push(PlacedMesh { obj: number, placement, materials });
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        self.meshes.push(PlacedMesh { name, obj: number, placement, materials });
         Ok(())
     }
 
@@ -268,6 +271,17 @@ impl SceneBuilder {
         TextureSet::decode(files, &required, &mut self.budget, &mut self.notes)
     }
 
+    /// Names and vertices of the meshes, whose parts have these ends.
+    fn meshes(&self, ends: &[u32]) -> Vec<(String, Range<u32>)> {
+        let (mut parts, mut first) = (0, 0);
+        let range = |mesh: &PlacedMesh| {
+            parts += self.objs[mesh.obj].groups.len();
+            let end = ends[..parts].last().copied().unwrap_or_default();
+            (mesh.name.clone(), core::mem::replace(&mut first, end)..end)
+        };
+        self.meshes.iter().map(range).collect()
+    }
+
     /// The scene with the buffers of the core.
     fn build(
         mut self,
@@ -334,6 +348,7 @@ impl SceneBuilder {
             overlaps: overlaps::both_orders(&overlaps),
             materials,
             material_names: names,
+            meshes: self.meshes(&geometry.ends),
             textures,
             lights: Vec::new(),
             environment,

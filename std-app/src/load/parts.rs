@@ -112,6 +112,7 @@ impl SceneParts {
         builder.objs.push(obj);
         let materials = [material.0, material.0].into();
         builder.meshes.push(PlacedMesh {
+            name: name.to_owned(),
             obj: builder.objs.len() - 1,
             placement: Placement::IDENTITY,
             materials,

@@ -4,6 +4,7 @@ use super::far_camera::start;
 use super::texture_set::TextureSet;
 use super::transform::{SceneTransform, direction};
 use crate::values::{Depth, MethodName, Samples, Seconds, Size, TargetError};
+use core::ops::Range;
 use glam::{DVec3, Vec3};
 use halflight_core::geometry::Bounds;
 use halflight_core::scene::{
@@ -29,6 +30,8 @@ pub struct LoadedScene {
     pub materials: Vec<Material>,
     /// Names of the materials.
     pub material_names: Vec<String>,
+    /// Names of the meshes, files without their extensions, and their vertices.
+    pub meshes: Vec<(String, Range<u32>)>,
     /// Textures of the materials and the environment.
     pub textures: TextureSet,
     /// Lights without surface.

@@ -21,8 +21,9 @@ const OTHERS: [&str; 3] = ["points", "vertices", "probes"];
 
 #[derive(Args)]
 pub(super) struct LightmapArgs {
-    /// Lightmap of the triangles of a material, or of `all`, in the texture coordinates of the files
-    #[arg(long, value_name = "MATERIAL", requires = "size", conflicts_with_all = OTHERS)]
+    /// Lightmap of a mesh, by the name of its file, of a material, or of `all`, in the texture coordinates
+    /// of the files
+    #[arg(long, value_name = "NAME", requires = "size", conflicts_with_all = OTHERS)]
     lightmap: Option<String>,
     /// Width and height of the lightmap in texels
     #[arg(long, value_name = "WxH", value_parser = values::size, conflicts_with_all = OTHERS)]
@@ -49,7 +50,7 @@ impl LightmapArgs {
         Some(self.run_lightmap(bake, (self.lightmap.as_ref()?, self.size?)))
     }
 
-    fn run_lightmap(&self, bake: &Bake, (material, size): (&str, [u32; 2])) -> Result<ExitCode, Failure> {
+    fn run_lightmap(&self, bake: &Bake, (subject, size): (&str, [u32; 2])) -> Result<ExitCode, Failure> {
         let mut outputs = Outputs::new(bake.json);
         let maps = pictures(&bake.output, self.directional)?;
         let error_map = pictures(self.error_map.as_slice(), false)?;
@@ -59,7 +60,7 @@ impl LightmapArgs {
         let options = LoadOptions { memory: bake.memory, keeps_texcoords: true, ..LoadOptions::default() };
         let loaded = bake.load(&outputs, &options)?;
         let settings = LightmapSettings {
-            material: (material != "all").then(|| material.to_owned()),
+            subject: (subject != "all").then(|| subject.to_owned()),
             size,
             points: self.supersample.unwrap_or(1),
             padding: self.pad.unwrap_or(PADDING),
