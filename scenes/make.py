@@ -163,6 +163,34 @@ def two_rooms():
     mesh.write(HERE / "two-rooms/two-rooms.obj", "two-rooms.mtl", "Two rooms and a door ajar.")
 
 
+def lightmap():
+    """A room without front, with a block and a lamp, each quadrilateral with a chart of its own in a grid of
+    four columns and three rows."""
+    room = Mesh()
+    room.room(["white", None, "red", "green", "white", "white"], (-1, 0, -1), (1, 2, 1))
+    room.box("white", (-0.65, 0, -0.55), (-0.05, 0.9, 0.05), turn=20)
+    room.faces = [face for face in room.faces if not rests(room, face)]
+    room.face("lamp", [(-0.35, 1.98, -0.35), (0.35, 1.98, -0.35), (0.35, 1.98, 0.35), (-0.35, 1.98, 0.35)])
+    number = lambda x: f"{x:.5f}".rstrip("0").rstrip(".")
+    lines = ["# A room whose faces are charts of a lightmap. Written by scenes/make.py.", "mtllib room.mtl"]
+    lines += ["v " + " ".join(map(number, position)) for position in room.positions]
+    for chart, (material, corners) in enumerate(room.faces):
+        column, row = chart % 4, chart // 4
+        for u, v in (0.08, 0.08), (0.92, 0.08), (0.92, 0.92), (0.08, 0.92):
+            lines.append(f"vt {number((column + u) / 4)} {number((row + v) / 3)}")
+        lines.append(f"usemtl {material}")
+        lines.append("f " + " ".join(f"{v}/{4 * chart + i + 1}" for i, (v, _) in enumerate(corners)))
+    (HERE / "lightmap").mkdir(exist_ok=True)
+    (HERE / "lightmap/room.obj").write_text("\n".join(lines) + "\n")
+
+
+def rests(mesh, face):
+    """True for the bottom of the block, which has no light: it is as large as the block."""
+    positions = list(mesh.positions)
+    corners = [positions[vertex - 1] for vertex, _ in face[1]]
+    return all(y == 0 for _, y, _ in corners) and max(x for x, _, _ in corners) < 0.9
+
+
 def mesh_is_at(mesh, face, x):
     positions = list(mesh.positions)
     return all(positions[vertex - 1][0] == x for vertex, _ in face[1])
@@ -176,3 +204,4 @@ if __name__ == "__main__":
     caustic()
     glossy()
     two_rooms()
+    lightmap()

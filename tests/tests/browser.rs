@@ -38,12 +38,28 @@ impl Drop for Folder {
 /// Console lines after `page` ran with `script` at its end, and the document then.
 pub(crate) fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> (Vec<String>, String) {
     let file = folder.join("page.html");
-    std::fs::write(&file, page.replace("</body>", &format!("<script>{script}</script></body>"))).unwrap();
+    std::fs::write(&file, with_script(page, script)).unwrap();
+    opened_at(browser, folder, &format!("file://{}", file.display()), &["--disable-gpu"])
+}
+
+/// The page with a script at its end.
+pub(crate) fn with_script(page: &str, script: &str) -> String {
+    page.replace("</body>", &format!("<script>{script}</script></body>"))
+}
+
+/// Console lines after the page at `address` ran in a browser with `flags`, and the document then.
+pub(crate) fn opened_at(
+    browser: &str,
+    folder: &Path,
+    address: &str,
+    flags: &[&str],
+) -> (Vec<String>, String) {
     let output = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr"])
+        .args(["--headless", "--no-sandbox", "--enable-logging=stderr"])
         .args(["--virtual-time-budget=10000", "--window-size=1200,900", "--dump-dom"])
         .arg(format!("--user-data-dir={}", folder.join("profile").display()))
-        .arg(format!("file://{}", file.display()))
+        .args(flags)
+        .arg(address)
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

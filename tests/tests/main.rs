@@ -28,6 +28,7 @@ mod light_area;
 mod light_kinds;
 mod light_many;
 mod light_support;
+mod lightmap_page;
 mod load;
 mod load_collection;
 mod load_meaning;

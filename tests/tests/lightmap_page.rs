@@ -1,0 +1,219 @@
+//! The page of scenes/lightmap in a real browser: the room with its lightmap beside our own picture, and a
+//! sphere lit by probes beside irradiances by its normals. Skipped with a message without Chromium or npm,
+//! which fetches the package `three`.
+
+use crate::browser::{Folder, browser, noted, opened_at, with_script};
+use core::f64::consts::PI;
+use core::sync::atomic::AtomicBool;
+use halflight::bake::{
+    BakeSettings, Baked, Lightmap, LightmapSettings, Probe, ProbeFormat, ProbeGrid, ProbeSettings, Quantity,
+    Sensor, irradiance, write_probes,
+};
+use halflight::compare::compare;
+use halflight::load::{LoadOptions, LoadedScene, load};
+use halflight::memory::Budget;
+use halflight::render::{Method, Settings, Stop, render};
+use halflight::save::{Format, Image, from_srgb};
+use halflight_core::glam::{DVec3, Vec3};
+use halflight_core::{IrradiancePoint, Rgb};
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The version of three.js whose layouts the page relies on.
+const THREE: &str = "three@0.187.0";
+
+/// Largest mean FLIP of the room in the browser against our own picture.
+const MOST_FLIP: f64 = 0.05;
+
+/// Largest root mean square error of the light of the sphere by its harmonics, relative to its largest value:
+/// bytes of sRGB.
+const BYTES: f64 = 0.005;
+
+/// The same beside irradiances by its normals: at this place harmonics of degree 2 have an error of 0.022.
+const MOST_ERROR: f64 = 0.03;
+
+/// The folder of the package `three`, which npm fetches into the folder of builds once.
+fn three() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target").join(THREE);
+    let package = folder.join("package");
+    if package.is_dir() {
+        return Some(package);
+    }
+    let npm = Command::new("npm").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    if !npm.is_ok_and(|status| status.success()) {
+        println!("skipped: no npm on this machine to fetch {THREE}");
+        return None;
+    }
+    std::fs::create_dir_all(&folder).unwrap();
+    let run = |program: &str, arguments: &[&str]| {
+        let output = Command::new(program).args(arguments).current_dir(&folder).output().unwrap();
+        assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    };
+    let archive = run("npm", &["pack", THREE, "--silent"]);
+    run("tar", &["xzf", archive.lines().last().unwrap()]);
+    Some(package)
+}
+
+/// Serves the files of `folder`, and those of `three` below /three/, to browsers of this machine until the
+/// program ends. Returns the port.
+fn serve(folder: PathBuf, three: PathBuf) -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let (folder, three) = (folder.clone(), three.clone());
+            std::thread::spawn(move || answer(stream, &folder, &three));
+        }
+    });
+    port
+}
+
+fn answer(mut stream: TcpStream, folder: &Path, three: &Path) -> std::io::Result<()> {
+    let mut lines = BufReader::new(stream.try_clone()?).lines().map_while(Result::ok);
+    let request = lines.next().unwrap_or_default();
+    lines.find(|line| line.is_empty());
+    let name = request.split(['?', ' ']).nth(1).unwrap_or_default().trim_start_matches('/');
+    let path = name.strip_prefix("three/").map_or_else(|| folder.join(name), |name| three.join(name));
+    let (status, bytes) = match std::fs::read(&path) {
+        Ok(bytes) => ("200 OK", bytes),
+        Err(_) => ("404 Not Found", Vec::new()),
+    };
+    let kind = match path.extension().and_then(|extension| extension.to_str()) {
+        Some("html") => "text/html",
+        Some("js") => "text/javascript",
+        Some("json") => "application/json",
+        _ => "application/octet-stream",
+    };
+    let length = bytes.len();
+    write!(stream, "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n")?;
+    write!(stream, "Connection: close\r\n\r\n")?;
+    stream.write_all(&bytes)
+}
+
+/// Notes the pixels of the canvas, in rows from the bottom.
+const SCRIPT: &str = "(async () => {
+    while (!document.documentElement.dataset.ready) await new Promise((done) => setTimeout(done, 60));
+    window.view.draw();
+    const gl = window.view.renderer.getContext();
+    const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+    const bytes = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    const probe = document.body.appendChild(document.createElement('pre'));
+    const note = (name, value) => { probe.textContent += `@${name}=${value}\\n`; };
+    note('size', width);
+    note('harmonics', window.view.sh.toArray().join(' '));
+    note('pixels', bytes.join(' '));
+})();";
+
+/// The linear picture that a browser shows, and its probe at the sphere.
+fn shown(browser: &str, folder: &Path, port: u16, query: &str) -> (Image, Probe) {
+    let flags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=300,300"];
+    let address = format!("http://127.0.0.1:{port}/index.html{query}");
+    let (console, document) = opened_at(browser, folder, &address, &flags);
+    let errors: Vec<_> = console.iter().filter(|line| line.contains("rror")).collect();
+    assert!(errors.is_empty(), "{errors:?}");
+    let side: u32 = noted(&document, "size").parse().unwrap();
+    let bytes: Vec<u8> = noted(&document, "pixels").split(' ').map(|byte| byte.parse().unwrap()).collect();
+    let linear = |rgba: &[u8]| [0, 1, 2].map(|channel| from_srgb(f32::from(rgba[channel]) / 255.0));
+    let rows = bytes.chunks(4 * side as usize).rev();
+    let pixels = rows.flat_map(|row| row.chunks(4).map(linear)).collect();
+    let harmonics: Vec<f32> =
+        noted(&document, "harmonics").split(' ').map(|number| number.parse().unwrap()).collect();
+    let coefficients = core::array::from_fn(|i| Rgb::from_slice(&harmonics[3 * i..]));
+    (Image { width: side, height: side, pixels }, Probe { coefficients, ..Probe::default() })
+}
+
+/// Irradiances of `points` by so many samples.
+fn bake(loaded: &LoadedScene, points: &[IrradiancePoint], samples: u32) -> Baked {
+    let stop = Stop { spp: Some(samples), ..Stop::default() };
+    let settings = BakeSettings { stop, back_faces: true, ..BakeSettings::default() };
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    irradiance(&scene, points, &settings, &mut |_| {}, &AtomicBool::new(false)).unwrap()
+}
+
+/// Writes the lightmap and the probes of the page into `folder`.
+fn write_light(loaded: &LoadedScene, folder: &Path) {
+    let mut budget = Budget::new(None);
+    let size = [160, 120];
+    let settings = LightmapSettings { subject: None, size, points: 1, padding: 4, directional: false };
+    let lightmap = Lightmap::new(loaded, settings, &mut budget).unwrap();
+    let map = lightmap.map(&bake(loaded, lightmap.points(), 128), Quantity::Irradiance);
+    std::fs::write(folder.join("map.exr"), map.encode(Format::Exr).unwrap()).unwrap();
+    let settings = ProbeSettings { size: [6; 3], bounds: None, cubes: false };
+    let grid = ProbeGrid::new(loaded, settings, &mut budget).unwrap();
+    let probes = grid.probes(&bake(loaded, grid.points(), 256));
+    let mut file = Vec::new();
+    write_probes(&mut file, ProbeFormat::Json, &grid, &probes).unwrap();
+    std::fs::write(folder.join("probes.json"), file).unwrap();
+}
+
+/// Pixels of the sphere of the page and its normals there.
+fn sphere_pixels(side: u32) -> Vec<(usize, Vec3)> {
+    let (eye, target, centre, radius) =
+        (DVec3::new(0.0, 1.0, 3.6), DVec3::new(0.0, 0.95, 0.0), DVec3::new(0.5, 0.45, 0.25), 0.3);
+    let along = (target - eye).normalize();
+    let across = along.cross(DVec3::Y).normalize();
+    let (up, slope) = (across.cross(along), 20f64.to_radians().tan());
+    let mut pixels = Vec::new();
+    for (x, y) in (0..side * side).map(|i| (i % side, i / side)).filter(|(x, y)| (x + 2 * y) % 5 == 0) {
+        let at = |pixel: u32| (2.0 * f64::from(pixel) + 1.0) / f64::from(side) - 1.0;
+        let direction = (along + slope * (at(x) * across - at(y) * up)).normalize();
+        let nearest = (centre - eye).dot(direction);
+        let square = radius * radius - (eye + nearest * direction - centre).length_squared();
+        // Pixels at the outline have other light in them.
+        if square > 0.2 * radius * radius {
+            let normal = (eye + (nearest - square.sqrt()) * direction - centre) / radius;
+            pixels.push(((y * side + x) as usize, normal.as_vec3()));
+        }
+    }
+    pixels
+}
+
+#[test]
+fn three_js_shows_the_lightmap_and_the_probes_as_we_do() {
+    let (Some(browser), Some(three)) = (browser(), three()) else { return };
+    let folder = Folder::new("lightmap");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/lightmap");
+    let page = std::fs::read_to_string(scene.join("index.html")).unwrap();
+    std::fs::write(folder.0.join("index.html"), with_script(&page, SCRIPT)).unwrap();
+    std::fs::copy(scene.join("room.obj"), folder.0.join("room.obj")).unwrap();
+    let options = LoadOptions { keeps_texcoords: true, ..LoadOptions::default() };
+    let loaded = load(&scene.join("room.toml"), &options).unwrap();
+    write_light(&loaded, &folder.0);
+    let port = serve(folder.0.clone(), three);
+
+    let (room, _) = shown(browser, &folder.0, port, "?sphere=off");
+    let (width, height) = (room.width, room.height);
+    let stop = Stop { spp: Some(64), ..Stop::default() };
+    let settings = Settings { width, height, stop, method: Some(Method::Path), ..Settings::default() };
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    let own = render(&scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap().image;
+    let flip = compare(&room, &own).unwrap().flip;
+    println!("room in the browser: FLIP {flip:.4}");
+    assert!(flip < MOST_FLIP, "{flip}");
+
+    let (picture, probe) = shown(browser, &folder.0, port, "");
+    let pixels = sphere_pixels(width);
+    assert!(pixels.len() > 50, "{}", pixels.len());
+    let sensor = |normal: &Vec3| Sensor { position: [0.5, 0.45, 0.25], normal: normal.as_dvec3().into() };
+    let points: Vec<_> = pixels.iter().map(|(_, normal)| sensor(normal).point(&loaded)).collect();
+    let truth = bake(&loaded, &points, 2048);
+    let found =
+        || pixels.iter().map(|(pixel, _)| DVec3::from(picture.pixels[*pixel].map(f64::from)) * PI / 0.7);
+    let by_harmonics: Vec<_> =
+        pixels.iter().map(|(_, normal)| probe.irradiance(*normal).as_dvec3()).collect();
+    let by_normals: Vec<_> = truth.values.iter().map(|value| value.irradiance.as_dvec3()).collect();
+    let error = |truth: &[DVec3]| {
+        let squares = found().zip(truth).map(|(found, truth)| (found - truth).length_squared() / 3.0);
+        let most = truth.iter().map(|truth| truth.max_element()).fold(0.0, f64::max);
+        (squares.sum::<f64>() / truth.len() as f64).sqrt() / most
+    };
+    let errors = [error(&by_harmonics), error(&by_normals)];
+    println!("sphere in the browser: errors {errors:.4?} at {} pixels", pixels.len());
+    assert!(errors[0] < BYTES && errors[1] < MOST_ERROR, "{errors:?}");
+}
