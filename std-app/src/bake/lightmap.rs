@@ -3,7 +3,7 @@
 
 use super::charts::{self, Charts, charts};
 use super::grid::Grid;
-use super::map::{Fetch, LightMap};
+use super::map::{Fetch, LightMap, Texel};
 use super::raster::{self, EMPTY, Raster, weights};
 use super::table::Quantity;
 use super::tilted::{linear, with_tilted};
@@ -180,6 +180,12 @@ impl Lightmap {
         &self.points
     }
 
+    /// Number of texels of charts that take the values of others in `map`.
+    pub fn filled(&self, map: &LightMap) -> usize {
+        let is_filled = |(chart, texel): (&u32, &Texel)| *chart != EMPTY && *texel == Texel::Filled;
+        self.charts.iter().zip(&map.texels).filter(|pair| is_filled(*pair)).count()
+    }
+
     /// Number of charts.
     pub fn charts(&self) -> usize {
         self.chart_count
@@ -190,8 +196,9 @@ impl Lightmap {
         let layers = self.settings.layers();
         let mut map = LightMap::empty(self.settings.size, layers);
         let is_valid = self.valid(&baked.back_faces);
+        let is_used = |bundle: usize| is_valid[bundle] && baked.values[bundle * layers].samples > 0;
         let mut counts = vec![0u32; self.charts.len()];
-        for (bundle, &texel) in self.texels.iter().enumerate().filter(|(bundle, _)| is_valid[*bundle]) {
+        for (bundle, &texel) in self.texels.iter().enumerate().filter(|(bundle, _)| is_used(*bundle)) {
             let of_bundle = bundle * layers..(bundle + 1) * layers;
             let (values, points) = (&baked.values[of_bundle.clone()], &self.points[of_bundle]);
             let fetch = match (values, points) {
@@ -218,14 +225,8 @@ impl Lightmap {
         let is_of_chart =
             |to: usize, from: usize| self.charts[to] != EMPTY && self.charts[to] == self.charts[from];
         grid.fill(&mut is_known, usize::MAX, is_of_chart, |texel, from| map.take(texel, from));
-        grid.fill(
-            &mut is_known,
-            self.settings.padding as usize,
-            |_, _| true,
-            |texel, from| {
-                map.take(texel, from);
-            },
-        );
+        let rings = self.settings.padding as usize;
+        grid.fill(&mut is_known, rings, |_, _| true, |texel, from| map.take(texel, from));
     }
 
     /// False for each bundle that is inside a body. Scenes whose walls show their backs are not inside one,

@@ -37,7 +37,7 @@ pub struct Probe {
     pub cube: [Rgb; 6],
     /// Fraction of its rays that first meet the back of a surface.
     pub back_faces: f32,
-    /// True if it is not inside a body; otherwise its light is the mean of its neighbours.
+    /// True if it has samples and is not inside a body; otherwise its light is the mean of its neighbours.
     pub is_valid: bool,
 }
 
@@ -122,7 +122,9 @@ impl ProbeGrid {
 
     fn probe(&self, values: &[PointIrradiance], shares: &[f32]) -> Probe {
         let back_faces = shares.iter().sum::<f32>() / shares.len() as f32;
-        let mut probe = Probe { back_faces, is_valid: back_faces <= INSIDE, ..Probe::default() };
+        let is_sampled = values.iter().all(|value| value.samples > 0);
+        let mut probe =
+            Probe { back_faces, is_valid: back_faces <= INSIDE && is_sampled, ..Probe::default() };
         let (of_design, of_axes) = values.split_at(values.len().min(design().len()));
         let solid_angle = 4.0 * PI / of_design.len() as f32;
         for (value, normal) in of_design.iter().zip(&self.normals) {

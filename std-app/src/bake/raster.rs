@@ -10,6 +10,9 @@ pub(super) const EMPTY: u32 = u32::MAX;
 /// Half the side of the square around the centre of a texel in which a bilinear fetch reads it.
 const REACH: f64 = 1.0;
 
+/// Distance of the owner of a texel that is known to overlap.
+const COUNTED: f64 = -1.0;
+
 /// Bytes of a texel while a map is rasterised.
 pub(super) const BYTES_OF_TEXEL: usize = size_of::<u32>() + size_of::<f64>() + 1;
 
@@ -56,6 +59,7 @@ impl<'a> Raster<'a> {
                     is_shared[texel] |= triangles[owner as usize].chart != triangle.chart;
                     if distance == 0.0 && distances[texel] == 0.0 {
                         overlaps.get_or_insert((0, [x, y])).0 += 1;
+                        distances[texel] = COUNTED;
                     }
                 }
                 if distance < distances[texel] {
@@ -156,4 +160,66 @@ fn nearest_on_border(corners: &[DVec2; 3], point: DVec2) -> DVec2 {
         if b.distance_squared(point) < a.distance_squared(point) { b } else { a }
     };
     nearer(nearer(first, second), third)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles of a lattice over a square of 24 texels, whose inner vertices are moved.
+    fn lattice(is_mirrored: bool) -> Charts {
+        let vertex = |x: u32, y: u32| {
+            let hash = |i: u32| f64::from((x * 7 + y * 13 + i).wrapping_mul(2_654_435_769) >> 16) / 65536.0;
+            let is_inner = (1..12).contains(&x) && (1..12).contains(&y);
+            let moved = if is_inner { DVec2::new(hash(0), hash(5)) - 0.5 } else { DVec2::ZERO };
+            2.0 * (DVec2::new(f64::from(x), f64::from(y)) + 0.4 * moved)
+        };
+        let mut triangles = Vec::new();
+        for (x, y) in (0..144).map(|i| (i % 12, i / 12)) {
+            let [a, b, c, d] = [vertex(x, y), vertex(x + 1, y), vertex(x + 1, y + 1), vertex(x, y + 1)];
+            for corners in [[a, b, c], [a, c, d]] {
+                let corners = if is_mirrored { [corners[0], corners[2], corners[1]] } else { corners };
+                triangles.push(ChartTriangle { triangle: 0, chart: 0, corners });
+            }
+        }
+        Charts { triangles, count: 1, flat: 0 }
+    }
+
+    #[test]
+    fn points_of_a_mesh_are_in_one_triangle_each() {
+        for is_mirrored in [false, true] {
+            let charts = lattice(is_mirrored);
+            for offset in [DVec2::ZERO, DVec2::splat(0.5)] {
+                let owners = Raster::new(&charts, [24, 24]).owners(offset, |_, _| true);
+                assert_eq!((owners.overlaps, owners.shared), (None, 0));
+                let is_inside = |texel: usize| {
+                    let point = DVec2::new((texel % 24) as f64, (texel / 24) as f64) + offset;
+                    is_inside(&charts.triangles[owners.triangles[texel] as usize], point)
+                };
+                let inner = (0..576).filter(|texel| texel % 24 > 0 && texel / 24 > 0);
+                assert!(inner.into_iter().all(is_inside));
+            }
+        }
+    }
+
+    #[test]
+    fn texels_in_several_triangles_are_counted_once() {
+        let mut charts = lattice(false);
+        let copies = [charts.triangles.clone(), charts.triangles.clone()].concat();
+        charts.triangles.extend(copies);
+        let owners = Raster::new(&charts, [24, 24]).owners(DVec2::splat(0.5), |_, _| true);
+        assert_eq!(owners.overlaps, Some((576, [0, 0])));
+    }
+
+    #[test]
+    fn weights_are_those_of_the_nearest_point_off_the_border() {
+        let corners = [DVec2::ZERO, DVec2::new(8.0, 0.0), DVec2::new(0.0, 4.0)];
+        let triangle = ChartTriangle { triangle: 0, chart: 0, corners };
+        let cases = [([2.0, 1.0], [0.25, 0.25]), ([4.0, -3.0], [0.5, 0.0]), ([-2.0, 9.0], [0.0, 1.0])];
+        for (point, [u, v]) in cases {
+            let [found_u, found_v] = weights(&triangle, point.into());
+            assert!((found_u - u).abs() < 3e-4 && (found_v - v).abs() < 3e-4, "{point:?}");
+            assert!(found_u.min(found_v).min(1.0 - found_u - found_v) > 0.5 * LEAST_WEIGHT as f32);
+        }
+    }
 }

@@ -81,7 +81,8 @@ pub struct BakeProgress {
 pub struct Baked {
     /// Values, in the order of the points.
     pub values: Vec<PointIrradiance>,
-    /// Fraction of the rays of each point that first meet the back of a surface; empty if not requested.
+    /// Fraction of the rays of each point that first meet the back of a surface; 0 where half of the time did
+    /// not suffice, empty if not requested.
     pub back_faces: Vec<f32>,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],
@@ -129,6 +130,11 @@ pub(crate) fn with_points(
     let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(settings.stop.seconds));
     let deadline = workers.deadline.after(1.0);
     let mut scratch = memory.take_each("working memory", IrradianceRenderer::scratch(), workers.count())?;
+    let context = SceneContext::new(scene, &built.bvh, &built.lights, settings.level);
+    let mut shares = vec![0.0; if settings.back_faces { points.len() } else { 0 }];
+    // The rest of the time is for the samples.
+    let end = End::Round(workers.deadline.after(0.5));
+    back_faces(&context, points, &mut shares, &mut Threads::new(&workers, &mut scratch).until(end))?;
     let mut executor = Threads::new(&workers, &mut scratch).until(End::FirstRound(None));
     let core = PointSettings {
         seed: settings.seed,
@@ -139,9 +145,6 @@ pub(crate) fn with_points(
     };
     let lights = built.lights.with_level(settings.level);
     let structures = (scene, built.bvh, lights);
-    let mut back_faces_of_points = vec![0.0; if settings.back_faces { points.len() } else { 0 }];
-    let context = SceneContext::new(scene, &built.bvh, &lights, settings.level);
-    back_faces(&context, points, &mut back_faces_of_points, &mut executor)?;
     let mut arena = Arena::over(&mut lines);
     let mut renderer = IrradianceRenderer::over(structures, points, &core, &mut arena, &mut executor)?;
 
@@ -175,7 +178,7 @@ pub(crate) fn with_points(
     }
     Ok(Baked {
         values: renderer.values().collect(),
-        back_faces: back_faces_of_points,
+        back_faces: shares,
         tiles: renderer.tiles(),
         counters: renderer.counters(),
         seconds: [built.seconds(), start.elapsed().as_secs_f64()],

@@ -76,13 +76,15 @@ impl LightmapArgs {
         let map = lightmap.map(&baked, bake.quantity());
         maps.iter().for_each(|(path, format)| save(&mut outputs, path, map.encode(*format)));
         error_map.iter().for_each(|(path, format)| save(&mut outputs, path, map.encode_error(*format)));
-        let [computed, filled] = [Texel::Computed, Texel::Filled].map(|coverage| map.count(coverage));
+        let (computed, filled) = (map.count(Texel::Computed), lightmap.filled(&map));
+        let padded = map.count(Texel::Filled) - filled;
         let charts = lightmap.charts();
         let mut object = bake.object(&baked);
         object["charts"] = charts.into();
-        object["texels"] = json!({ "computed": computed, "filled": filled });
+        object["texels"] = json!({ "computed": computed, "filled": filled, "padded": padded });
         object["error_map"] = self.error_map.as_deref().map_or(Value::Null, file_name);
-        let text = format!("{charts} charts, {computed} texels and {filled} filled; {}", bake.text(&baked));
+        let text =
+            format!("{charts} charts, {computed} texels computed and {filled} filled; {}", bake.text(&baked));
         let results = if bake.json { object.to_string() } else { text };
         Ok(outputs.end(&results, code(&baked)))
     }
