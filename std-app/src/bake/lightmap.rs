@@ -191,16 +191,17 @@ impl Lightmap {
         self.chart_count
     }
 
-    /// The map of `baked` irradiances of the points.
+    /// The map of `baked` irradiances of the points. Without fractions of back faces all points are outside.
     pub fn map(&self, baked: &Baked, quantity: Quantity) -> LightMap {
         let layers = self.settings.layers();
         let mut map = LightMap::empty(self.settings.size, layers);
-        let is_valid = self.valid(&baked.back_faces);
-        let is_used = |bundle: usize| is_valid[bundle] && baked.values[bundle * layers].samples > 0;
         let mut counts = vec![0u32; self.charts.len()];
-        for (bundle, &texel) in self.texels.iter().enumerate().filter(|(bundle, _)| is_used(*bundle)) {
-            let of_bundle = bundle * layers..(bundle + 1) * layers;
-            let (values, points) = (&baked.values[of_bundle.clone()], &self.points[of_bundle]);
+        let bundles = baked.values.chunks_exact(layers).zip(self.points.chunks_exact(layers));
+        let texels = self.texels.iter().zip(self.valid(&baked.back_faces));
+        for ((values, points), (&texel, is_valid)) in bundles.zip(texels) {
+            if !is_valid || values[0].samples == 0 {
+                continue;
+            }
             let fetch = match (values, points) {
                 ([a, b, c, d], [e, f, g, h]) => {
                     let irradiances = [a, b, c, d].map(|value| value.irradiance.to_array());
@@ -232,7 +233,8 @@ impl Lightmap {
     /// False for each bundle that is inside a body. Scenes whose walls show their backs are not inside one,
     /// and no more are charts without a bundle outside.
     fn valid(&self, back_faces: &[f32]) -> Vec<bool> {
-        let shares: Vec<f32> = back_faces.iter().step_by(self.settings.layers()).copied().collect();
+        let known = back_faces.iter().step_by(self.settings.layers()).copied();
+        let shares: Vec<f32> = known.chain(core::iter::repeat(0.0)).take(self.texels.len()).collect();
         let mut sorted = shares.clone();
         sorted.sort_unstable_by(f32::total_cmp);
         let is_inverted = sorted.get(sorted.len() / 2).is_some_and(|median| *median > INSIDE);

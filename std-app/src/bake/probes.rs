@@ -107,16 +107,12 @@ impl ProbeGrid {
             probes.iter_mut().for_each(|probe| probe.is_valid = true);
         }
         let mut is_known: Vec<bool> = probes.iter().map(|probe| probe.is_valid).collect();
-        Grid(self.size()).fill(
-            &mut is_known,
-            usize::MAX,
-            |_, _| true,
-            |cell, from| {
-                let Probe { back_faces, is_valid, .. } = probes[cell];
-                let mean = mean(from.iter().map(|other| &probes[*other]));
-                probes[cell] = Probe { back_faces, is_valid, ..mean };
-            },
-        );
+        let take = |cell: usize, from: &[usize]| {
+            let Probe { back_faces, is_valid, .. } = probes[cell];
+            let mean = mean(from.iter().map(|other| &probes[*other]));
+            probes[cell] = Probe { back_faces, is_valid, ..mean };
+        };
+        Grid(self.size()).fill(&mut is_known, usize::MAX, |_, _| true, take);
         probes
     }
 
