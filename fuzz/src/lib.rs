@@ -10,6 +10,8 @@ pub mod cache_file;
 pub mod chains;
 pub mod derivatives;
 #[cfg(feature = "app")]
+pub mod gltf;
+#[cfg(feature = "app")]
 pub mod image_input;
 pub mod kernels;
 pub mod lanes;
@@ -46,6 +48,8 @@ pub const TARGETS: &[Target] = &[
     Target { name: "cache_file", run: cache_file::run },
     Target { name: "chains", run: chains::run },
     Target { name: "derivatives", run: derivatives::run },
+    #[cfg(feature = "app")]
+    Target { name: "gltf", run: gltf::run },
     #[cfg(feature = "app")]
     Target { name: "image_input", run: image_input::run },
     Target { name: "kernels", run: kernels::run },

@@ -32,7 +32,7 @@ use std::process::ExitCode;
 /// intervals are 2 %, or after 60 s.
 #[derive(Args)]
 pub(super) struct Bake {
-    /// Scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Sensors, a line `x y z nx ny nz` each; `-` is standard input
     #[arg(long, value_name = "FILE", required_unless_present_any = ["vertices", "lightmap", "probes"])]

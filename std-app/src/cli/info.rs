@@ -20,7 +20,7 @@ use std::process::ExitCode;
 /// Print the contents of a scene, its camera and memory
 #[derive(Args)]
 pub(super) struct Info {
-    /// Scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Size of the film whose memory is printed [default: that of the scene file, or 512x512]
     #[arg(long, value_name = "WxH", value_parser = values::size)]

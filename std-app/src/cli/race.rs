@@ -31,7 +31,7 @@ use std::time::Instant;
 /// race early with exit code 3.
 #[derive(Args)]
 pub(super) struct Race {
-    /// Scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Methods of `render`, each with options after colons, as in path,path:max-depth=2; an option is a flag
     /// below without dashes, and wins over the flag of the race

@@ -22,7 +22,7 @@ use std::time::Instant;
 /// these three replaces all three of it. Ctrl-C ends the render early with a valid picture and exit code 3.
 #[derive(Args)]
 pub(super) struct Render {
-    /// Scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Picture: .png, .exr, .hdr or .pfm; may be repeated [default: name of the scene with .png, in the
     /// current folder]

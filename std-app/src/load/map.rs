@@ -42,6 +42,8 @@ pub struct MapOptions {
     pub bump_multiplier: Option<f64>,
     /// `-imfchan r|g|b|m|l`: the channel of a scalar map or of heights.
     pub channel: Option<Channel>,
+    /// Not in MTL: opacity is 1 from this alpha on, and 0 below.
+    pub threshold: Option<f64>,
     /// Options without effect.
     pub unsupported: Vec<Name>,
 }
@@ -54,6 +56,7 @@ impl Default for MapOptions {
             clamp: false,
             bump_multiplier: None,
             channel: None,
+            threshold: None,
             unsupported: Vec::new(),
         }
     }

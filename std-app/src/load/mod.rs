@@ -1,11 +1,12 @@
-//! Loading of scenes: OBJ with MTL ([`obj`], [`mtl`]), pictures ([`crate::picture`]), and the scene file that
-//! places meshes and adds camera, lights and settings ([`scene_file`]).
+//! Loading of scenes: OBJ with MTL ([`obj`], [`mtl`]), glTF ([`gltf`]), pictures ([`crate::picture`]), and
+//! the scene file that places meshes and adds camera, lights and settings ([`scene_file`]).
 //!
 //! A load repairs its input as far as possible and notes each kind of repair once; everything else is a
 //! [`LoadError`] with file, line and help. `docs/loading.md` has the table of both. The parsers take
-//! arbitrary bytes: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
+//! arbitrary bytes: [`obj::parse`], [`mtl::parse`], [`gltf::parse`], [`scene_file::parse`].
 
 mod buffers;
+mod bytes;
 mod coplanar;
 mod duplicate_emitters;
 mod error;
@@ -13,10 +14,12 @@ mod far_camera;
 mod files;
 mod fit;
 mod geometry;
+pub mod gltf;
 mod illum;
 mod library;
 mod map;
 mod memory_estimate;
+mod models;
 pub mod mtl;
 mod name;
 mod notes;
@@ -25,6 +28,7 @@ mod open_glass;
 mod overlaps;
 mod parts;
 mod placed;
+mod placed_light;
 mod relief;
 mod scene;
 pub mod scene_file;
@@ -42,7 +46,7 @@ pub use map::{Channel, Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
 pub use parts::{MaterialId, PartMesh, SceneParts};
-pub use scene::{LoadedScene, RenderSettings, SceneViews, View};
+pub use scene::{LoadedScene, NamedCamera, RenderSettings, SceneViews, View};
 pub use texture_set::TextureSet;
 pub use transform::{SceneTransform, direction};
 
@@ -51,15 +55,18 @@ use core::ops::Range;
 use files::Lookup;
 use halflight_core::scene::{Environment, Material};
 use library::{Library, Sources};
+use models::ReadModel;
 use mtl::MtlMaterial;
 use name::readings;
 use placed::{Placed, Placement};
+use placed_light::PlacedLight;
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use texcoords::Texcoords;
+use texture_set::Embedded;
 
 /// Options of a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,17 +86,21 @@ impl Default for LoadOptions {
     }
 }
 
-/// Loads a scene file (`.toml`) or a mesh with its materials (`.obj`).
+/// Loads a scene file (`.toml`), a mesh with its materials (`.obj`), or a scene of glTF (`.glb`, `.gltf`).
 pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
         Some("toml") => scene_file::load(path, options),
-        Some("obj") => {
+        Some("obj" | "glb" | "gltf") => {
             let mut builder = SceneBuilder::new(options);
-            builder.add_mesh(path, Placement::IDENTITY, None)?;
+            builder.add_file(path, Placement::IDENTITY, None)?;
             builder.build(path, options, None)
         }
-        _ => Err(LoadError::of_file(path, "unknown kind of scene", "scenes are .obj or .toml files")),
+        _ => Err(LoadError::of_file(
+            path,
+            "unknown kind of scene",
+            "scenes are .obj, .glb, .gltf or .toml files",
+        )),
     }
 }
 
@@ -129,6 +140,13 @@ struct SceneBuilder {
     /// Changes by the scene file, by name of the material.
     overrides: BTreeMap<String, MaterialChange>,
     used_overrides: BTreeSet<String>,
+    /// glTF files that are read.
+    models: HashMap<PathBuf, Rc<ReadModel>>,
+    /// Pictures in glTF files, and the bytes of those files.
+    embedded: Embedded,
+    held: usize,
+    lights: Vec<PlacedLight>,
+    cameras: Vec<NamedCamera>,
     lookup: Lookup,
     notes: Notes,
 }
@@ -155,6 +173,11 @@ impl SceneBuilder {
             material_numbers: HashMap::new(),
             overrides: BTreeMap::new(),
             used_overrides: BTreeSet::new(),
+            models: HashMap::new(),
+            embedded: HashMap::new(),
+            held: 0,
+            lights: Vec::new(),
+            cameras: Vec::new(),
             lookup: Lookup::default(),
             notes: Notes::default(),
         }
@@ -244,16 +267,20 @@ impl SceneBuilder {
         if let Some(&number) = self.material_numbers.get(&key) {
             return number;
         }
-        let shown = name.to_string();
-        let mut material = found.unwrap_or(MtlMaterial { name, ..MtlMaterial::default() });
+        let number = self.new_material(found.unwrap_or(MtlMaterial { name, ..MtlMaterial::default() }));
+        self.material_numbers.insert(key, number);
+        number
+    }
+
+    /// Adds a material with the changes of the scene file.
+    fn new_material(&mut self, mut material: MtlMaterial) -> u32 {
+        let shown = material.name.to_string();
         if let Some(change) = self.overrides.get(&shown) {
             change.apply(&mut material);
             self.used_overrides.insert(shown);
         }
-        let number = self.materials.len() as u32;
         self.materials.push(material);
-        self.material_numbers.insert(key, number);
-        number
+        self.materials.len() as u32 - 1
     }
 
     /// Decodes the textures of all materials and of the environment.
@@ -268,7 +295,10 @@ impl SceneBuilder {
         let files = maps.filter_map(file).filter(|_| options.textures);
         let required = self.overrides.values().flat_map(|change| change.material().maps.values());
         let required = required.chain(of_environment()).filter_map(file).collect();
-        TextureSet::decode(files, &required, &mut self.budget, &mut self.notes)
+        let set = TextureSet::decode(files, &required, &self.embedded, &mut self.budget, &mut self.notes)?;
+        self.embedded.clear();
+        self.budget.give_back(core::mem::take(&mut self.held));
+        Ok(set)
     }
 
     /// Names and vertices of the meshes, whose parts have these ends.
@@ -340,7 +370,8 @@ impl SceneBuilder {
         overlaps::note(&overlaps, &geometry.triangles, &materials, &names, notes);
         touching_glass::relate(&mut geometry, &overlaps, &mut materials, &mut names, notes);
         open_glass::note(&geometry, &materials, &names, notes);
-        Ok(LoadedScene {
+        let lights = self.lights.iter().filter_map(|light| light.in_core(&fit.transform, notes)).collect();
+        let loaded = LoadedScene {
             positions: geometry.positions,
             normals: geometry.normals,
             texcoords: geometry.texcoords,
@@ -350,15 +381,17 @@ impl SceneBuilder {
             material_names: names,
             meshes: self.meshes(&geometry.ends),
             textures,
-            lights: Vec::new(),
+            lights,
             environment,
             camera: None,
             view: None,
+            cameras: self.cameras,
             settings: RenderSettings::default(),
             transform: fit.transform,
             files: self.lookup.into_files().into_iter().chain([path.into()]).collect(),
             repairs: self.notes.sentences(),
-        })
+        };
+        Ok(loaded.with_first_camera())
     }
 }
 

@@ -36,6 +36,8 @@ pub struct MtlMaterial {
     pub surely_glass: bool,
     /// Not in MTL: the scene file specifies `Ks`, which is a reflectance.
     pub surely_reflects: bool,
+    /// Not in MTL: a glTF file specifies metallic-roughness, and no convention of MTL applies.
+    pub exact: bool,
     /// Not in MTL: both sides emit.
     pub two_sided: bool,
     /// Texture statements.

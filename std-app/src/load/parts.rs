@@ -2,6 +2,7 @@
 
 use super::obj::{Group, Obj};
 use super::placed::Placement;
+use super::placed_light::PlacedLight;
 use super::scene_file::EnvironmentChange;
 use super::{
     LoadError, LoadOptions, LoadedScene, PlacedMesh, SceneBuilder, View, memory_estimate, too_large,
@@ -51,7 +52,6 @@ pub struct PartMesh<'a> {
 pub struct SceneParts {
     builder: SceneBuilder,
     options: LoadOptions,
-    lights: Vec<PointLight>,
     environment: Option<Rgb>,
     view: Option<(View, f64)>,
 }
@@ -66,7 +66,7 @@ impl SceneParts {
     /// No parts yet; `options` limit the memory.
     pub fn new(options: LoadOptions) -> Self {
         let builder = SceneBuilder::new(&options);
-        Self { builder, options, lights: Vec::new(), environment: None, view: None }
+        Self { builder, options, environment: None, view: None }
     }
 
     /// Adds a material, or changes the one of this name.
@@ -122,7 +122,7 @@ impl SceneParts {
 
     /// Adds a light without surface, in the coordinates and units of the meshes.
     pub fn light(&mut self, light: PointLight) {
-        self.lights.push(light);
+        self.builder.lights.push(PlacedLight::new(light));
     }
 
     /// Gives rays that leave the scene this radiance.
@@ -140,27 +140,11 @@ impl SceneParts {
     /// # Errors
     /// Insufficient memory, more vertices than 32 bits can count, or a camera that looks at its own position.
     pub fn build(self) -> Result<LoadedScene, LoadError> {
-        let Self { builder, options, lights, environment, view } = self;
+        let Self { builder, options, environment, view } = self;
         let name = Path::new("scene");
         let sky = |radiance| EnvironmentChange { radiance, map: None, to_map: Mat3::IDENTITY };
         let mut loaded = builder.build(name, &options, environment.map(sky))?;
         loaded.files.clear();
-        let point = |user: glam::Vec3| loaded.transform.point(user.as_dvec3().to_array());
-        let factor = loaded.transform.intensity_factor() as f32;
-        let placed = |light: PointLight| match light {
-            PointLight::Point { position, intensity } => {
-                PointLight::Point { position: point(position), intensity: factor * intensity }
-            }
-            PointLight::Spot { position, direction, intensity, cos_inner, cos_outer } => PointLight::Spot {
-                position: point(position),
-                direction,
-                intensity: factor * intensity,
-                cos_inner,
-                cos_outer,
-            },
-            directional => directional,
-        };
-        loaded.lights = lights.into_iter().map(placed).collect();
         if let Some((view, fov_degrees)) = view {
             let camera = loaded.camera_at(view, fov_degrees).ok_or_else(|| {
                 LoadError::of_file(name, "`eye` and `look_at` are the same point", "move one of them")

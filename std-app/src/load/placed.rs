@@ -26,6 +26,14 @@ impl Placement {
         (self.linear * DVec3::from(p) + self.offset).into()
     }
 
+    /// The placement of something that is placed by `inner` in a file that is placed by this.
+    pub(super) fn of(&self, inner: &Self) -> Self {
+        if *self == Self::IDENTITY {
+            return *inner;
+        }
+        Self { linear: self.linear * inner.linear, offset: self.linear * inner.offset + self.offset }
+    }
+
     /// Transform of normals that keeps their side: the inverse transpose, up to a positive factor.
     pub(super) fn normal_matrix(&self) -> DMat3 {
         let [x, y, z] = [self.linear.x_axis, self.linear.y_axis, self.linear.z_axis];

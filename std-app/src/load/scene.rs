@@ -38,10 +38,12 @@ pub struct LoadedScene {
     pub lights: Vec<PointLight>,
     /// Light from infinity.
     pub environment: Option<Environment>,
-    /// The camera of the scene file.
+    /// The camera of the scene file, or the first of a glTF file.
     pub camera: Option<Camera>,
     /// Its position and direction.
     pub view: Option<View>,
+    /// Cameras of glTF files; the first is `camera` if the scene file has none.
+    pub cameras: Vec<NamedCamera>,
     /// Settings of the scene file.
     pub settings: RenderSettings,
     /// Transform from file coordinates to buffer coordinates.
@@ -82,6 +84,17 @@ pub struct View {
     pub look_at: [f64; 3],
     /// Direction that is up in the picture.
     pub up: [f64; 3],
+}
+
+/// A camera of a glTF file, in the coordinates of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedCamera {
+    /// Name of its node, or its own; may be empty.
+    pub name: String,
+    /// Position and direction.
+    pub view: View,
+    /// Vertical field of view in degrees.
+    pub fov_degrees: f64,
 }
 
 /// Sine of the angle between view and up below which rounding errors would rotate the picture.
@@ -139,6 +152,16 @@ impl LoadedScene {
         let distance = DVec3::from(view.eye).distance(view.look_at.into());
         let camera = self.transform.camera(view.eye, view.look_at, view.up, fov_degrees);
         Some(Camera { focus_distance: self.transform.length(distance) as f32, ..camera })
+    }
+
+    /// The scene as its first camera sees it.
+    pub(super) fn with_first_camera(mut self) -> Self {
+        if let Some(first) = self.cameras.first() {
+            let camera = self.camera_at(first.view, first.fov_degrees);
+            (self.camera, self.view) =
+                (camera.map(|camera| self.with_start(camera, first.view)), Some(first.view));
+        }
+        self
     }
 
     /// `camera` with a lens of this radius and distance in focus, by default its own, in the units of the

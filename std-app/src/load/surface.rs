@@ -53,6 +53,9 @@ impl Resolver<'_> {
         }
         let base = self.diffuse();
         let metallic = self.metallic();
+        if self.mtl.exact {
+            return self.metallic_roughness(base, metallic);
+        }
         if metallic.texture.is_none() && metallic.value >= 1.0 {
             self.metal(base)
         } else if metallic == 0.0.into() && self.is_mirror(&base) {
@@ -60,6 +63,23 @@ impl Resolver<'_> {
         } else {
             self.coated(base, metallic)
         }
+    }
+
+    /// The metallic-roughness model of glTF: the coat does not change the light of the base.
+    fn metallic_roughness(&mut self, base: ColorInput, metallic: ScalarInput) -> Surface {
+        let roughness = self.roughness();
+        if metallic.texture.is_none() && metallic.value >= 1.0 {
+            return Surface::Conductor { reflectance: base, roughness };
+        }
+        let specular = if self.has_specular() {
+            self.specular()
+        } else {
+            Rgb::splat(fresnel(self.ior().unwrap_or(DEFAULT_IOR)) as f32).into()
+        };
+        if is_black(&specular) && metallic.value == 0.0 {
+            return Surface::Diffuse { reflectance: base };
+        }
+        Surface::Glossy { base, specular, roughness, metallic, ior: None }
     }
 
     fn glass(&mut self) -> Surface {

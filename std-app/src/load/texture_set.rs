@@ -1,6 +1,7 @@
 //! Textures of a scene. Each picture is decoded once and has a view per use: colours or numbers, repeated or
 //! clamped.
 
+use super::bytes::Bytes;
 use super::error::LoadError;
 use super::map::{Channel, Map, MapOptions};
 use super::notes::Notes;
@@ -10,6 +11,7 @@ use crate::memory::{self, Budget, Shortage};
 use crate::picture::{self, FileError, Info, Picture, Samples, fail};
 use halflight_core::scene::{Texture, TextureId, TextureTransform, Wrap};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -20,13 +22,16 @@ const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// Longest side of a texture in pixels.
 const LONGEST_SIDE: u32 = 1 << 15;
 
+/// Pictures within other files, by the names that their maps have.
+pub(super) type Embedded = HashMap<PathBuf, Bytes>;
+
 /// Pictures, and their views, to which materials refer by [`TextureId`].
 #[derive(Clone, Debug, Default)]
 pub struct TextureSet {
     pictures: Vec<Picture>,
     by_file: HashMap<PathBuf, usize>,
-    /// Pictures of single channels of others.
-    derived: HashMap<(usize, Channel), usize>,
+    /// Pictures of single channels of others, or of a threshold on them.
+    derived: HashMap<(usize, Channel, Option<u64>), usize>,
     /// Bytes that derived pictures may take.
     spare: usize,
     views: Vec<View>,
@@ -51,6 +56,7 @@ impl TextureSet {
     pub(super) fn decode(
         files: impl Iterator<Item = PathBuf>,
         required: &BTreeSet<PathBuf>,
+        embedded: &Embedded,
         budget: &mut Budget,
         notes: &mut Notes,
     ) -> Result<Self, LoadError> {
@@ -62,7 +68,7 @@ impl TextureSet {
             // Headers are read one after the other: the set of pictures that fit does not depend on threads.
             let (mut batch, mut peaks) = (Vec::new(), 0usize);
             while let Some((file, later)) = rest.split_first() {
-                match measure(file, budget.left()) {
+                match measure(file, embedded, budget.left()) {
                     // The next batch decodes it.
                     Ok(peak) if !batch.is_empty() && peaks.saturating_add(peak) > budget.left() => break,
                     Ok(peak) => {
@@ -73,7 +79,7 @@ impl TextureSet {
                 }
                 rest = later;
             }
-            set.decode_batch(&batch, required, budget, notes)?;
+            set.decode_batch(&batch, required, embedded, budget, notes)?;
         }
         set.spare = budget.left();
         Ok(set)
@@ -83,11 +89,12 @@ impl TextureSet {
         &mut self,
         batch: &[(&PathBuf, usize)],
         required: &BTreeSet<PathBuf>,
+        embedded: &Embedded,
         budget: &mut Budget,
         notes: &mut Notes,
     ) -> Result<(), LoadError> {
         let read = |&(file, peak): &(&PathBuf, usize)| {
-            let bytes = memory::read_file(file, peak).map_err(FileError::new)?;
+            let bytes = bytes(file, embedded, peak)?;
             picture::decode(&bytes, file, peak - bytes.len()).map(texture::prepared)
         };
         let decoded: Vec<Result<Picture, FileError>> = batch.par_iter().map(read).collect();
@@ -139,6 +146,9 @@ impl TextureSet {
     /// The channel of an opacity map, by default alpha if there is one, else red.
     pub(super) fn opacity(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
         let map = map?;
+        if map.options.threshold.is_some() {
+            return Some((self.derived(map, Channel::Component(ALPHA))?, 0));
+        }
         let default = if self.picture(map)?.has_alpha { ALPHA } else { 0 };
         self.channel(map, map.options.channel.unwrap_or(Channel::Component(default)))
     }
@@ -173,7 +183,9 @@ impl TextureSet {
     /// A view of one channel of the picture of a map in all channels; of its red one if memory is short.
     fn derived(&mut self, map: &Map, channel: Channel) -> Option<TextureId> {
         let source = *self.by_file.get(map.found.as_ref()?)?;
-        if !self.derived.contains_key(&(source, channel)) {
+        let threshold = map.options.threshold;
+        let key = (source, channel, threshold.map(f64::to_bits));
+        if !self.derived.contains_key(&key) {
             let picture = &self.pictures[source];
             let Picture { width, height, .. } = *picture;
             let Some(spare) = self.spare.checked_sub(width as usize * height as usize * size_of::<f32>())
@@ -185,12 +197,17 @@ impl TextureSet {
                 Channel::Component(component) => [r, g, b, a][usize::from(component & 3)],
                 Channel::Luminance => LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b,
             };
-            let samples = Samples::Floats { rgb: Vec::new(), alpha: colours(picture).map(value).collect() };
+            let masked = |value: f32| match threshold {
+                Some(threshold) => f32::from(u8::from(f64::from(value) >= threshold)),
+                None => value,
+            };
+            let alpha = colours(picture).map(|texel| masked(value(texel))).collect();
+            let samples = Samples::Floats { rgb: Vec::new(), alpha };
             self.spare = spare;
-            self.derived.insert((source, channel), self.pictures.len());
+            self.derived.insert(key, self.pictures.len());
             self.pictures.push(Picture { width, height, samples, has_alpha: true, notes: Vec::new() });
         }
-        Some(self.view_of(self.derived[&(source, channel)], map, Content::Alpha))
+        Some(self.view_of(self.derived[&key], map, Content::Alpha))
     }
 
     /// Bytes of the pictures of single channels.
@@ -201,6 +218,11 @@ impl TextureSet {
     /// The kind of relief in the picture of a map; `None` if it was not decoded.
     pub(super) fn relief(&self, map: &Map) -> Option<Relief> {
         Some(relief::classify(&texture::view(self.picture(map)?, Content::Data, Wrap::Repeat)))
+    }
+
+    /// True if the picture of a map was decoded and has an alpha channel.
+    pub(super) fn has_alpha(&self, map: &Map) -> bool {
+        self.picture(map).is_some_and(|picture| picture.has_alpha)
     }
 
     fn picture(&self, map: &Map) -> Option<&Picture> {
@@ -270,12 +292,20 @@ fn colours(picture: &Picture) -> Box<dyn Iterator<Item = [f32; 4]> + '_> {
     }
 }
 
+/// Bytes of a picture, embedded or of a file.
+fn bytes<'a>(file: &Path, embedded: &'a Embedded, most: usize) -> Result<Cow<'a, [u8]>, FileError> {
+    match embedded.get(file) {
+        Some(bytes) => Ok(Cow::Borrowed(bytes)),
+        None => Ok(Cow::Owned(memory::read_file(file, most).map_err(FileError::new)?)),
+    }
+}
+
 /// Bytes that decoding a picture takes, including its file, by its header.
 ///
 /// # Errors
 /// The file is no picture, or needs more than `most` bytes.
-fn measure(file: &Path, most: usize) -> Result<usize, FileError> {
-    let bytes = memory::read_file(file, most).map_err(FileError::new)?;
+fn measure(file: &Path, embedded: &Embedded, most: usize) -> Result<usize, FileError> {
+    let bytes = bytes(file, embedded, most)?;
     let Info { width, height, peak, .. } = picture::read_info(&bytes, file)?;
     if width.max(height) > LONGEST_SIDE {
         fail!("it has {width}x{height} pixels; a texture has at most {LONGEST_SIDE} a side");

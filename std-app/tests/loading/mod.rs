@@ -1,5 +1,6 @@
-//! Parts of the loader that read bytes without other files.
+//! Parts of the loader that read bytes without other files, and glTF files.
 
+mod gltf;
 mod mtl;
 mod notes;
 mod scene_file;

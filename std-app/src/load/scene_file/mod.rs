@@ -55,7 +55,7 @@ pub struct SceneFile {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshEntry {
-    /// An OBJ file, relative to the scene file.
+    /// An OBJ or glTF file, relative to the scene file.
     pub file: Spanned<String>,
     /// One factor or three.
     #[serde(default)]
@@ -190,12 +190,13 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     builder.lookup = source.lookup.take();
     for (mesh, file) in scene.mesh.iter().zip(mesh_files) {
         let material = mesh.material.as_ref().map(|name| name.get_ref().as_str());
-        builder.add_mesh(&file, mesh.placement(&source)?, material)?;
+        builder.add_file(&file, mesh.placement(&source)?, material)?;
     }
     let mut loaded = builder.build(path, options, environment)?;
     let transform = loaded.transform;
-    loaded.lights =
-        scene.light.iter().map(|light| light::light(light, &transform, &source)).collect::<Result<_, _>>()?;
+    for light in &scene.light {
+        loaded.lights.push(light::light(light, &transform, &source)?);
+    }
     if let Some(camera) = &scene.camera {
         place_camera(camera, &mut loaded, &source)?;
     }
@@ -204,7 +205,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
 }
 
 impl MeshEntry {
-    /// The OBJ file; checks that the material exists.
+    /// The file; checks that the material exists.
     fn checked_file(&self, scene: &SceneFile, source: &Source) -> Result<PathBuf, LoadError> {
         let file = source.resolve(&self.file)?;
         match &self.material {

@@ -72,7 +72,7 @@ impl Resolver<'_> {
         has_map: bool,
     ) -> [f64; N] {
         let factor = given.unwrap_or(absent);
-        if !hides_map(factor, has_map) {
+        if self.mtl.exact || !hides_map(factor, has_map) {
             return factor;
         }
         let name = &self.mtl.name;
@@ -84,7 +84,9 @@ impl Resolver<'_> {
     /// `d`; 1 for glass, which transmits light by refraction.
     pub(super) fn opacity(&mut self) -> ScalarInput {
         let mtl = self.mtl;
-        let texture = self.textures.opacity(mtl.map(MapKind::Opacity));
+        // An exact map without alpha is opaque.
+        let map = mtl.map(MapKind::Opacity).filter(|map| !mtl.exact || self.textures.has_alpha(map));
+        let texture = self.textures.opacity(map);
         let [value] = self.factor("d", mtl.opacity.map(|d| [d]), [1.0], texture.is_some());
         let value = if is_glass(mtl) && value < 1.0 {
             self.notes.add(1, "`d` of a glass (illum 4, 6, 7, 9) left out: it refracts, it is not cut out");
@@ -102,6 +104,10 @@ impl Resolver<'_> {
     pub(super) fn normal_map(&mut self) -> Option<NormalMap> {
         let mtl = self.mtl;
         let normals = mtl.map(MapKind::Normal).filter(|map| self.textures.relief(map).is_some());
+        if let Some(map) = mtl.map(MapKind::Normal).filter(|_| mtl.exact) {
+            let scale = map.options.bump_multiplier.unwrap_or(1.0) as f32;
+            return Some(NormalMap::Tangent(self.textures.data(Some(map))?, scale));
+        }
         let (map, statement) = match normals {
             Some(map) => (map, "norm"),
             None => (mtl.map(MapKind::Bump)?, "bump"),

@@ -32,7 +32,7 @@ use std::time::Instant;
 /// The errors are relMSE against a reference of another seed, less the noise of the reference.
 #[derive(Args)]
 pub(super) struct Reconstruction {
-    /// Scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Samples per pixel
     #[arg(long, value_name = "N", default_value = "64", value_parser = clap::value_parser!(u32).range(4..=1 << 20))]

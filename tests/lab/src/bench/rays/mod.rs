@@ -25,7 +25,7 @@ use std::path::PathBuf;
 /// quarter of the scene's diagonal long.
 #[derive(Args)]
 pub(super) struct Rays {
-    /// Scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Size of the picture, with one camera ray per pixel
     #[arg(long, value_name = "WxH", value_parser = flags::size, default_value = "1024x1024")]

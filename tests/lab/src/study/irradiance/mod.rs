@@ -33,7 +33,7 @@ use std::thread::available_parallelism;
 /// 2 %. The cached irradiance is then compared with many gather rays at points of the picture.
 #[derive(Args)]
 pub(super) struct Irradiance {
-    /// Scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Records per metric
     #[arg(long, value_name = "N", default_value = "1700",

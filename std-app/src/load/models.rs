@@ -1,0 +1,91 @@
+//! glTF files in a scene under construction: read once, placed as often as the scene file says.
+
+use super::gltf;
+use super::placed::Placement;
+use super::placed_light::PlacedLight;
+use super::scene::{NamedCamera, View};
+use super::{LoadError, MORE_MEMORY, PlacedMesh, SceneBuilder, obj, too_large};
+use crate::memory;
+use glam::DVec3;
+use std::path::Path;
+use std::rc::Rc;
+
+/// A glTF file whose meshes and materials are in the scene.
+pub(super) struct ReadModel {
+    /// Index of the OBJ of each instance, and its placement in the file.
+    instances: Vec<(usize, Placement)>,
+    materials: Rc<[u32]>,
+    lights: Vec<PlacedLight>,
+    cameras: Vec<NamedCamera>,
+}
+
+impl SceneBuilder {
+    /// Places a file by its extension; `material` replaces all of its materials.
+    pub(super) fn add_file(
+        &mut self,
+        path: &Path,
+        placement: Placement,
+        material: Option<&str>,
+    ) -> Result<(), LoadError> {
+        let extension = path.extension().unwrap_or_default();
+        if !["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {
+            return self.add_mesh(path, placement, material);
+        }
+        let model = match self.models.get(path) {
+            Some(model) => model.clone(),
+            None => {
+                let model = Rc::new(self.read_model(path)?);
+                self.models.insert(path.into(), model.clone());
+                model
+            }
+        };
+        let materials = match material {
+            Some(material) => {
+                let material = self.material(None, material.into(), None);
+                vec![material; model.materials.len()].into()
+            }
+            None => model.materials.clone(),
+        };
+        for (obj, own) in &model.instances {
+            let placement = placement.of(own);
+            self.meshes.push(PlacedMesh { obj: *obj, placement, materials: materials.clone() });
+        }
+        self.lights.extend(model.lights.iter().map(|light| light.placed(&placement)));
+        self.cameras.extend(model.cameras.iter().map(|camera| placed(camera, &placement)));
+        Ok(())
+    }
+
+    fn read_model(&mut self, path: &Path) -> Result<ReadModel, LoadError> {
+        let bytes = memory::read_file(path, self.budget.left())
+            .map_err(|error| LoadError::of_file(path, format!("cannot be read: {error}"), MORE_MEMORY))?;
+        self.budget.take(bytes.len()).map_err(|why| too_large(path, &why))?;
+        self.held += bytes.len();
+        let model = gltf::read(bytes, path, Some(&mut self.lookup), &mut self.budget)?;
+        self.held += model.held;
+        self.notes.merge(model.notes);
+        self.embedded.extend(model.pictures);
+        let first = self.objs.len();
+        let obj = |groups| obj::Obj { groups, ..obj::Obj::default() };
+        self.objs.extend(model.meshes.into_iter().map(obj));
+        // The last is for faces without material, which glTF does not have.
+        let mut materials: Vec<u32> =
+            model.materials.into_iter().map(|material| self.new_material(material)).collect();
+        materials.extend(materials.last().copied());
+        Ok(ReadModel {
+            instances: model.instances.into_iter().map(|(mesh, own)| (first + mesh, own)).collect(),
+            materials: materials.into(),
+            lights: model.lights,
+            cameras: model.cameras,
+        })
+    }
+}
+
+/// A camera of a file that is placed in the scene.
+fn placed(camera: &NamedCamera, placement: &Placement) -> NamedCamera {
+    let View { eye, look_at, up } = camera.view;
+    let up = (placement.linear * DVec3::from(up)).into();
+    NamedCamera {
+        view: View { eye: placement.point(eye), look_at: placement.point(look_at), up },
+        ..camera.clone()
+    }
+}

@@ -1,0 +1,133 @@
+//! Textures: their channels, samplers and transforms.
+
+use super::{Gltf, load_files, pixel, png, says};
+use glam::Vec2;
+use halflight::load::LoadedScene;
+use halflight_core::scene::{NormalMap, ScalarInput, Surface, TextureId};
+use serde_json::{Value, json};
+
+/// A square whose texture 0 is this PNG.
+fn textured(png: &[u8], material: Value) -> Gltf {
+    let mut file = Gltf::square(material);
+    let view = file.view(png);
+    file.json["images"] = json!([{ "bufferView": view, "mimeType": "image/png" }]);
+    file.json["textures"] = json!([{ "source": 0 }]);
+    file
+}
+
+/// RGBA of a texture at texture coordinates of the scene.
+fn texel(scene: &LoadedScene, id: TextureId, uv: [f32; 2]) -> [f32; 4] {
+    scene.textures.views()[id.0 as usize].lookup(Vec2::from(uv))
+}
+
+fn scalar(scene: &LoadedScene, input: ScalarInput) -> f32 {
+    let (id, channel) = input.texture.unwrap();
+    input.value * texel(scene, id, [0.5; 2])[usize::from(channel)]
+}
+
+#[test]
+fn channels_of_metallic_roughness_and_their_factors() {
+    let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "roughnessFactor": 0.5,
+        "metallicRoughnessTexture": { "index": 0 } } });
+    let scene = textured(&pixel([255, 51, 102, 0]), material).loaded();
+    let Surface::Glossy { base, roughness, metallic, .. } = scene.materials[0].surface else { panic!() };
+    assert!((scalar(&scene, roughness) - 0.1).abs() < 1e-6);
+    assert!((scalar(&scene, metallic) - 0.4).abs() < 1e-6);
+    // Colours are in the sRGB curve.
+    let color = texel(&scene, base.texture.unwrap(), [0.5; 2]);
+    assert!((color[1] - 0.0331).abs() < 1e-3 && scene.materials[0].opacity == 1.0.into());
+    assert!(scene.repairs.is_empty(), "{:?}", scene.repairs);
+}
+
+#[test]
+fn alpha_of_the_colour_blends_or_masks() {
+    let material = |mode: &str| {
+        json!({ "alphaMode": mode, "alphaCutoff": 0.25,
+            "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.5], "baseColorTexture": { "index": 0 } } })
+    };
+    let opacity = |alpha: u8, mode: &str| {
+        let scene = textured(&pixel([9, 9, 9, alpha]), material(mode)).loaded();
+        scalar(&scene, scene.materials[0].opacity)
+    };
+    assert_eq!(opacity(51, "BLEND"), 0.1);
+    // Half of the alpha is compared with a quarter.
+    assert_eq!([opacity(126, "MASK"), opacity(128, "MASK")], [0.0, 1.0]);
+}
+
+#[test]
+fn normals_are_normals_whatever_they_show() {
+    let material = json!({ "normalTexture": { "index": 0, "scale": 0.5 } });
+    let scene = textured(&pixel([128, 128, 128, 255]), material).loaded();
+    assert!(matches!(scene.materials[0].normal_map, Some(NormalMap::Tangent(_, 0.5))));
+    assert!(scene.repairs.is_empty(), "{:?}", scene.repairs);
+}
+
+#[test]
+fn emissive_texture_has_a_factor() {
+    let material = json!({ "emissiveFactor": [0.5, 0.5, 0.5], "emissiveTexture": { "index": 0 } });
+    let scene = textured(&pixel([255, 0, 0, 255]), material).loaded();
+    let emission = scene.materials[0].emission;
+    assert_eq!((emission.value, emission.texture.is_some()), ([0.5; 3].into(), true));
+    let dark = textured(&pixel([255; 4]), json!({ "emissiveTexture": { "index": 0 } })).loaded();
+    assert!(!dark.materials[0].emits(), "the default factor is black");
+}
+
+/// Four texels: red and green above, blue and white below.
+const FOUR: [u8; 16] = [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255];
+
+/// Colour of the corner that is lower left in the picture, at (0, 1) in the file.
+fn first_corner(info: Value) -> [f32; 3] {
+    let mut file =
+        textured(&png(2, 2, &FOUR), json!({ "pbrMetallicRoughness": { "baseColorTexture": info } }));
+    file.json["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33071 }]);
+    file.json["textures"][0]["sampler"] = json!(0);
+    let scene = file.loaded();
+    let Surface::Conductor { reflectance, .. } = scene.materials[0].surface else { panic!() };
+    let [r, g, b, _] = texel(&scene, reflectance.texture.unwrap(), scene.texcoords[0]);
+    [r, g, b]
+}
+
+#[test]
+fn rows_of_a_picture_go_down_and_transforms_apply() {
+    let with = |transform: Value| {
+        first_corner(json!({ "index": 0, "extensions": { "KHR_texture_transform": transform } }))
+    };
+    assert_eq!(first_corner(json!({ "index": 0 })), [0.0, 0.0, 1.0]);
+    assert_eq!(with(json!({ "offset": [1, 0] })), [1.0; 3]);
+    assert_eq!(with(json!({ "offset": [0, -1] })), [1.0, 0.0, 0.0]);
+    assert_eq!(with(json!({ "scale": [1, -1], "offset": [0, 1] })), [1.0, 0.0, 0.0]);
+    // The corner (0, 1) moves to (sin, cos) of the rotation: of a right angle to (1, 0).
+    assert_eq!(with(json!({ "rotation": core::f64::consts::FRAC_PI_2 })), [0.0, 1.0, 0.0]);
+    assert_eq!(with(json!({ "texCoord": 1, "scale": [2, 4] })), [1.0; 3]);
+    assert_eq!(first_corner(json!({ "index": 0, "texCoord": 1 })), [0.5, 0.5, 0.0]);
+}
+
+#[test]
+fn pictures_are_files_data_or_left_out() {
+    let png = pixel([0, 255, 0, 255]);
+    let data =
+        format!("data:image/png;base64,{}", base64::Engine::encode(&base64::prelude::BASE64_STANDARD, &png));
+    let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+    let mut file = textured(&[], material);
+    let mut load = |image: Value| {
+        file.json["images"] = json!([image]);
+        load_files(&[("s.glb", &file.glb()), ("p q.png", &png)], "s.glb").unwrap()
+    };
+    for (uri, is_file) in [(&data[..], false), ("p%20q.png", true)] {
+        let scene = load(json!({ "uri": uri }));
+        assert_eq!(scene.textures.len(), 1);
+        assert_eq!(scene.files.iter().any(|file| file.ends_with("p q.png")), is_file);
+        assert!(scene.repairs.is_empty(), "{:?}", scene.repairs);
+    }
+    for (image, words) in [
+        (json!({ "uri": "none.png" }), "is missing"),
+        (json!({ "uri": "https://example.org/a.png" }), "nothing is fetched"),
+        (json!({ "uri": "data:image/png;base64,%" }), "base64"),
+        (json!({ "bufferView": 99 }), "buffer view 99"),
+        (json!({}), "no bytes"),
+        (json!({ "bufferView": 0 }), "cannot be read"),
+    ] {
+        let scene = load(image);
+        assert!(scene.textures.is_empty() && says(&scene, &[words]), "{words}: {:?}", scene.repairs);
+    }
+}
