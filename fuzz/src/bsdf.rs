@@ -77,10 +77,11 @@ fn good(color: Rgb) -> bool {
 }
 
 fn surface(input: &mut Unstructured) -> Result<Surface> {
-    Ok(match input.int_in_range(0..=4)? {
+    Ok(match input.int_in_range(0..=5)? {
         0 => Surface::Diffuse { reflectance: color(input)? },
         1 => Surface::Mirror { reflectance: color(input)? },
         2 => Surface::Conductor { reflectance: color(input)?, roughness: scalar(input)? },
+        4 => Surface::Pane { ior: 1.0 + 0.1 * coordinate(input)?, tint: color(input)?.value },
         3 => Surface::Glossy {
             base: color(input)?,
             specular: color(input)?,

@@ -98,7 +98,7 @@ fn light(input: &mut Unstructured) -> Result<PointLight> {
     })
 }
 
-const MATERIALS: usize = 10;
+const MATERIALS: usize = 11;
 
 fn materials() -> [Material; MATERIALS] {
     let of = |surface| Material { surface, ..Material::GREY };
@@ -131,5 +131,6 @@ fn materials() -> [Material; MATERIALS] {
         of(coat(0.0)),
         of(coat(0.2)),
         Material { opacity: 0.5.into(), ..Material::GREY },
+        of(Surface::Pane { ior: 1.5, tint: Rgb::new(0.9, 0.6, 0.3) }),
     ]
 }

@@ -74,6 +74,16 @@ fn glass_vanishes_under_a_white_sky() {
 }
 
 #[test]
+fn clear_panes_vanish_under_a_white_sky() {
+    for ior in [1.5, 1.0, 2.4] {
+        let scene = under_the_sky(Surface::Pane { ior, tint: WHITE });
+        assert_picture(&scene, |_| (), |_, _| 1.0);
+        let pixels = picture::render(&scene, 0, |_| ());
+        assert!(pixels.iter().all(|pixel| (pixel - 1.0).abs() < 1e-5), "{ior}: {pixels:?}");
+    }
+}
+
+#[test]
 fn nothing_gives_back_more_than_it_gets() {
     let rough = |alpha: f32| alpha.sqrt().into();
     let surfaces = [

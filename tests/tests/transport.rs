@@ -12,7 +12,7 @@ use halflight_core::film::{Dropped, Film, Pixel};
 use halflight_core::geometry::Ray;
 use halflight_core::memory::Arena;
 use halflight_core::sampling::Sampler;
-use halflight_core::scene::{Camera, Scene, SurfacePoint};
+use halflight_core::scene::{Camera, Material, Scene, Surface, SurfacePoint};
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::path::reference;
@@ -49,7 +49,11 @@ fn the_cornell_box_has_the_light_it_had() {
 
 #[test]
 fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
-    for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0)] {
+    let mut window = room_with_lamp(0.3, 5.0);
+    let surface = Surface::Pane { ior: 1.5, tint: [0.9, 0.5, 0.2].into() };
+    let pane = window.material(Material { surface, ..Material::GREY });
+    window.square(Vec3::splat(0.4), Vec3::new(0.2, 0.5, 1.0), 0.5, pane);
+    for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0), window] {
         let scene = buffers.scene();
         let settings = PathSettings { width: 24, height: 20, seed: 3, max_depth: UNLIMITED };
         let samples = 0..3;

@@ -59,7 +59,7 @@ impl Bsdf {
     #[inline]
     pub(crate) fn is_caustic_caster(&self) -> bool {
         match self {
-            Bsdf::Mirror(_) | Bsdf::Dielectric(_) => true,
+            Bsdf::Mirror(_) | Bsdf::Pane(_) | Bsdf::Dielectric(_) => true,
             Bsdf::Conductor(conductor) => conductor.alpha < CAUSTIC_ALPHA,
             Bsdf::RoughDielectric(glass) => glass.alpha < CAUSTIC_ALPHA,
             Bsdf::Diffuse(_) | Bsdf::Glossy(_) | Bsdf::Plastic(_) => self.is_delta(),

@@ -14,6 +14,7 @@ mod class;
 mod coated;
 mod glossy;
 mod lobe;
+mod pane;
 mod plastic;
 mod range;
 mod resolve;
@@ -25,6 +26,7 @@ pub(crate) use base::CoatTransmittance;
 pub use glossy::Glossy;
 pub use halflight_simd::kernels::shade::{fresnel, ggx};
 pub(crate) use lobe::MicrofacetLobe;
+pub use pane::Pane;
 pub use plastic::Plastic;
 pub use uncoated::{Conductor, Dielectric, Diffuse, Mirror, RoughDielectric};
 
@@ -42,6 +44,8 @@ pub enum Bsdf {
     Diffuse(Diffuse),
     /// Perfect mirror.
     Mirror(Mirror),
+    /// Thin pane, where a ray does not pass it.
+    Pane(Pane),
     /// Metal, smooth or rough.
     Conductor(Conductor),
     /// Coat with Schlick's reflectance over a base.
@@ -96,6 +100,7 @@ impl Bsdf {
         BsdfSample::of(match self {
             Bsdf::Diffuse(b) => sample_diffuse(b.reflectance.into(), at),
             Bsdf::Mirror(b) if F::GLOSSY => SampleLanes::mirrored(wo, b.reflectance.into(), 1.0),
+            Bsdf::Pane(b) if F::GLOSSY => SampleLanes::mirrored(wo, b.mirrored(wo[2]).into(), 1.0),
             Bsdf::Conductor(b) if F::GLOSSY && b.alpha == 0.0 => {
                 SampleLanes::mirrored(wo, fresnel::schlick(b.f0.into(), wo[2]), 1.0)
             }
@@ -129,7 +134,7 @@ impl Bsdf {
     pub fn is_delta(&self) -> bool {
         match self {
             Bsdf::Diffuse(_) | Bsdf::RoughDielectric(_) => false,
-            Bsdf::Mirror(_) | Bsdf::Dielectric(_) => true,
+            Bsdf::Mirror(_) | Bsdf::Pane(_) | Bsdf::Dielectric(_) => true,
             Bsdf::Conductor(b) => b.alpha == 0.0,
             Bsdf::Glossy(b) => b.is_delta(),
             Bsdf::Plastic(b) => b.is_delta(),
@@ -152,6 +157,7 @@ impl Bsdf {
         match self {
             Bsdf::Diffuse(b) => b.reflectance,
             Bsdf::Mirror(b) => b.reflectance,
+            Bsdf::Pane(b) => b.tint(),
             Bsdf::Conductor(b) => b.f0,
             Bsdf::Glossy(_) | Bsdf::Plastic(_) => self.coated_albedo().unwrap_or_default(),
             Bsdf::Dielectric(b) => b.tint,

@@ -1,7 +1,7 @@
 //! BSDF of a hit from a material of the scene: looks up textures and clamps parameters.
 
 use super::range::{MAX_INDEX, unit, unit_rgb};
-use super::{Bsdf, Conductor, Dielectric, Diffuse, Features, Glossy, Mirror, Plastic, RoughDielectric};
+use super::{Bsdf, Conductor, Dielectric, Diffuse, Features, Glossy, Mirror, Pane, Plastic, RoughDielectric};
 use crate::Rgb;
 use crate::scene::{ColorInput, Material, SMOOTH_ALPHA, ScalarInput, Scene, Surface};
 use glam::Vec2;
@@ -31,6 +31,7 @@ impl Bsdf {
             Surface::Mirror { reflectance } if F::GLOSSY => {
                 Bsdf::Mirror(Mirror { reflectance: color(reflectance) })
             }
+            Surface::Pane { ior, tint } if F::GLOSSY => Bsdf::Pane(Pane::new(*ior, *tint)),
             Surface::Conductor { reflectance, roughness } if F::GLOSSY => {
                 Bsdf::Conductor(Conductor { f0: color(reflectance), alpha: alpha(roughness) })
             }

@@ -11,6 +11,8 @@ pub struct SurfaceKinds {
     pub diffuse: u64,
     /// Perfect mirrors.
     pub mirror: u64,
+    /// Thin panes.
+    pub pane: u64,
     /// Metals.
     pub conductor: u64,
     /// Coats over a base.
@@ -116,6 +118,10 @@ impl Census {
                 specular = true;
                 &mut self.surfaces.mirror
             }
+            Surface::Pane { .. } => {
+                specular = true;
+                &mut self.surfaces.pane
+            }
             Surface::Conductor { roughness, .. } => {
                 specular = smooth(roughness);
                 &mut self.surfaces.conductor
@@ -160,6 +166,7 @@ fn has_texture(material: &Material) -> bool {
         Surface::Glossy { base, specular, roughness, metallic, .. } => {
             color(base) || color(specular) || scalar(roughness) || scalar(metallic)
         }
+        Surface::Pane { .. } => false,
         Surface::Dielectric { roughness, .. } => scalar(roughness),
     };
     surface || color(&material.emission) || scalar(&material.opacity) || material.normal_map.is_some()

@@ -93,7 +93,7 @@ impl Plan {
         let kinds = &census.surfaces;
         let needed = FeatureFlags {
             textures: census.textured > 0,
-            glossy: kinds.mirror + kinds.conductor + kinds.glossy > 0,
+            glossy: kinds.mirror + kinds.pane + kinds.conductor + kinds.glossy > 0,
             dielectric: kinds.dielectric + kinds.rough_dielectric > 0,
             normal_maps: census.normal_mapped > 0,
             cutout: census.cutout > 0,

@@ -7,6 +7,7 @@ use crate::bsdf::Features;
 use crate::findings::Decision::{LeftOut, Used};
 use crate::findings::{Finding, Findings, Value};
 use crate::memory::{Footprint, OutOfMemory};
+use crate::scene::Material;
 use crate::transport::{PathIntegrator, PathReuse, Pilot, path::WAVE};
 
 /// Use of path reuse among neighbouring pixels.
@@ -49,7 +50,8 @@ impl<'a, F: Features> PathTracing<'a, F> {
         PathIntegrator::<F>::scratch_with::<(), PathReuse>(WAVE)
     }
 
-    /// Path tracing of `context`, with path `reuse` or without; `None` where a pilot decides.
+    /// Path tracing of `context`, with path `reuse` or without; `None` where a pilot decides. Scenes with
+    /// tinted panes have none.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is too small.
@@ -59,6 +61,9 @@ impl<'a, F: Features> PathTracing<'a, F> {
         executor: &mut impl Executor,
     ) -> Result<Self, OutOfMemory> {
         let (integrator, pilots) = (context.integrator::<F>(), context.pilots);
+        // The factor of a pane belongs to the path that has passed it, and not to those that share its light.
+        let is_coloured = context.scene.materials.iter().any(Material::is_tinted_pane);
+        let reuse = if is_coloured { Some(false) } else { reuse };
         let (reuse, mean) = match reuse {
             Some(false) => (Reuse::default(), None),
             Some(true) => {

@@ -201,7 +201,8 @@ impl<'a, F: Features> Chains<'a, F> {
         }
         let Some(point) = self.context.surface_at(ray, hit) else { return self.escape(seen) };
         let is_left = seen.surfaces == 0 && point.is_left_by(ray);
-        if is_left || self.context.is_skipped(&point, hit, seen.triangle, || random(seen.surfaces)) {
+        let passes = |surfaces| self.context.passed(&point, (ray, hit), seen.triangle, || random(surfaces));
+        if is_left || passes(seen.surfaces).is_some() {
             return self.onward(hit, seen, point.spawn(ray.direction.into()));
         }
         let bsdf = self.context.bsdf_at(&point);
@@ -229,7 +230,7 @@ impl<'a, F: Features> Chains<'a, F> {
             Surface::Glossy { base, specular, metallic, .. } => {
                 base.texture.is_some() || specular.texture.is_some() || metallic.texture.is_some()
             }
-            Surface::Dielectric { .. } | Surface::Mirror { .. } => false,
+            Surface::Dielectric { .. } | Surface::Mirror { .. } | Surface::Pane { .. } => false,
         };
         self.context.scene.mesh.normals.is_empty() && material.normal_map.is_none() && !is_textured
     }
@@ -312,7 +313,7 @@ impl<'a, F: Features> Chains<'a, F> {
             let random = || sampler.single(CROSSING.wrapping_add(1 << 16).wrapping_add(traced as u32));
             if material.has_cutout() || hit.triangle == left {
                 let Some(point) = self.context.surface_at(&ray, &hit) else { break };
-                if self.context.is_skipped(&point, &hit, left, random) {
+                if self.context.passed(&point, (&ray, &hit), left, random).is_some() {
                     (left, ray) = (hit.triangle, point.spawn(ray.direction.into()));
                     hit = self.context.nearest(&ray);
                     traced += 1;

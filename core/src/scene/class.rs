@@ -24,7 +24,7 @@ impl Surface {
     pub fn may_be_smooth(&self) -> bool {
         match self {
             Surface::Diffuse { .. } => false,
-            Surface::Mirror { .. } | Surface::Dielectric { .. } => true,
+            Surface::Mirror { .. } | Surface::Pane { .. } | Surface::Dielectric { .. } => true,
             Surface::Conductor { roughness, .. } | Surface::Glossy { roughness, .. } => {
                 roughness.texture.is_some() || roughness.value * roughness.value < SMOOTH_ALPHA
             }
@@ -34,7 +34,7 @@ impl Surface {
     /// True if the surface may have a rough lobe somewhere that is not purely diffuse.
     pub fn may_be_rough(&self) -> bool {
         match self {
-            Surface::Diffuse { .. } | Surface::Mirror { .. } => false,
+            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Pane { .. } => false,
             Surface::Glossy { .. } => true,
             Surface::Conductor { roughness, .. } | Surface::Dielectric { roughness, .. } => {
                 roughness.texture.is_some() || roughness.value * roughness.value >= SMOOTH_ALPHA
@@ -48,7 +48,7 @@ impl Material {
     pub(crate) fn may_be_caustic_caster(&self) -> bool {
         match &self.surface {
             Surface::Diffuse { .. } => false,
-            Surface::Mirror { .. } => true,
+            Surface::Mirror { .. } | Surface::Pane { .. } => true,
             Surface::Dielectric { roughness, .. } | Surface::Conductor { roughness, .. } => {
                 roughness.texture.is_some() || roughness.value * roughness.value < CAUSTIC_ALPHA
             }
@@ -61,7 +61,10 @@ impl Material {
     pub(crate) fn may_pass_caustics(&self) -> bool {
         match &self.surface {
             Surface::Diffuse { .. } => false,
-            Surface::Mirror { .. } | Surface::Dielectric { .. } | Surface::Conductor { .. } => true,
+            Surface::Mirror { .. }
+            | Surface::Pane { .. }
+            | Surface::Dielectric { .. }
+            | Surface::Conductor { .. } => true,
             Surface::Glossy { base, metallic, .. } => {
                 // Without a base it reflects specularly, as far as is known without its textures.
                 let base =

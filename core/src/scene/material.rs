@@ -18,6 +18,14 @@ pub enum Surface {
         /// Reflectance at every angle.
         reflectance: ColorInput,
     },
+    /// Two parallel smooth faces in air, as of a window: mirrors a part of the light, and lets the rest pass
+    /// straight on. On both sides.
+    Pane {
+        /// Index of refraction, at least 1.
+        ior: f32,
+        /// Transmittance of the body at normal incidence.
+        tint: Rgb,
+    },
     /// GGX metal with Schlick's Fresnel term.
     Conductor {
         /// Reflectance at normal incidence.
@@ -51,14 +59,14 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// Colour of the whole surface, or of the base below its coat. `None` for a dielectric.
+    /// Colour of the whole surface, or of the base below its coat. `None` for a pane or dielectric.
     #[inline]
     pub(crate) fn color(&self) -> Option<&ColorInput> {
         match self {
             Self::Diffuse { reflectance } | Self::Mirror { reflectance } => Some(reflectance),
             Self::Conductor { reflectance, .. } => Some(reflectance),
             Self::Glossy { base, .. } => Some(base),
-            Self::Dielectric { .. } => None,
+            Self::Pane { .. } | Self::Dielectric { .. } => None,
         }
     }
 }
@@ -115,9 +123,17 @@ impl Material {
         self.emission.value.max_element() > 0.0
     }
 
-    /// True if a ray may pass through by opacity.
+    /// True if it is a pane that colours rays that pass it.
+    #[inline]
+    pub(crate) fn is_tinted_pane(&self) -> bool {
+        matches!(self.surface, Surface::Pane { tint, .. } if tint != Rgb::splat(tint.x))
+    }
+
+    /// True if a ray may pass straight through, by opacity or because it is a pane.
     #[inline]
     pub fn has_cutout(&self) -> bool {
-        self.opacity.value < 1.0 || self.opacity.texture.is_some()
+        self.opacity.value < 1.0
+            || self.opacity.texture.is_some()
+            || matches!(self.surface, Surface::Pane { .. })
     }
 }

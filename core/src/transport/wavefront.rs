@@ -112,7 +112,8 @@ impl PathState {
         let sampler = Sampler::new(seed, self.pixel, self.sample);
         let opacity = |crossings| sampler.single(dimension::opacity(segments, crossings));
         let met = (ray, hit, point);
-        context.stop(&mut origin, met, segments == 1, opacity, counters).inspect_err(|_| {
+        let state = (&mut origin, &mut self.throughput);
+        context.stop(state, met, segments == 1, opacity, counters).inspect_err(|_| {
             (self.triangle, self.crossings) = (origin.triangle, origin.crossings as u16);
         })
     }

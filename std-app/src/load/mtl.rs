@@ -34,6 +34,8 @@ pub struct MtlMaterial {
     pub illumination: Option<u32>,
     /// Not in MTL: the scene file specifies glass, whatever the other statements suggest.
     pub surely_glass: bool,
+    /// Not in MTL: a scene file or glTF specifies a thin pane of index `Ni` and colour `Tf`.
+    pub pane: bool,
     /// Not in MTL: the scene file specifies `Ks`, which is a reflectance.
     pub surely_reflects: bool,
     /// Not in MTL: a glTF file specifies metallic-roughness, and no convention of MTL applies.

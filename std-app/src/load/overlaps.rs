@@ -104,7 +104,7 @@ fn is_plain(material: &Material) -> bool {
             let [base, specular] = [base, specular].map(|colour| colour.texture.is_none());
             base && specular && roughness.texture.is_none() && metallic.texture.is_none()
         }
-        Surface::Dielectric { .. } => false,
+        Surface::Pane { .. } | Surface::Dielectric { .. } => false,
     };
     is_constant && !material.emits() && !material.has_cutout() && material.normal_map.is_none()
 }

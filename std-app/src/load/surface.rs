@@ -48,6 +48,9 @@ struct Resolver<'a> {
 impl Resolver<'_> {
     /// `Pr`, `Pm`, their maps and a diffuse base override `illum`.
     fn surface(&mut self) -> Surface {
+        if self.mtl.pane {
+            return self.pane();
+        }
         if is_glass(self.mtl) {
             return self.glass();
         }
@@ -63,6 +66,15 @@ impl Resolver<'_> {
         } else {
             self.coated(base, metallic)
         }
+    }
+
+    fn pane(&mut self) -> Surface {
+        let tint = self.reflectance("Tf", self.mtl.tint.unwrap_or([1.0; 3]));
+        let ior = self.ior().unwrap_or(DEFAULT_IOR);
+        if ior < 1.0 {
+            self.notes.add(1, format!("pane `{}` has an index below 1: 1 is used", self.mtl.name));
+        }
+        Surface::Pane { ior: ior as f32, tint }
     }
 
     /// The metallic-roughness model of glTF: the coat does not change the light of the base.

@@ -14,6 +14,7 @@ pub fn counts(census: &Census, scene: &Scene) -> Vec<(&'static str, u64)> {
         ("textures", census.textures),
         ("diffuse", kinds.diffuse),
         ("mirror", kinds.mirror),
+        ("pane", kinds.pane),
         ("conductor", kinds.conductor),
         ("glossy", kinds.glossy),
         ("dielectric", kinds.dielectric),

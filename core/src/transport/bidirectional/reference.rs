@@ -144,7 +144,11 @@ impl<'a> Reference<'a> {
             let Some(point) = context.surface_at(&ray, &hit) else { break };
             let opacity = |crossings| sampler.single(dimension::opacity(segments, crossings));
             let met = (&ray, &hit, &point);
-            match context.stop(&mut origin, met, segments == 1, opacity, &mut Counters::default()) {
+            let mut passed = [1.0; 3];
+            let state = (&mut origin, &mut passed);
+            let stopped = context.stop(state, met, segments == 1, opacity, &mut Counters::default());
+            throughput *= Rgb::from(passed);
+            match stopped {
                 Ok(()) => {}
                 Err(None) => break,
                 Err(Some(behind)) => {

@@ -111,12 +111,12 @@ pub(super) fn follow(
         }
         let Some(point) = context.surface_at(&ray, &hit) else { break };
 
-        // Skipped surface: by rounding, or a cut-out.
-        let opacity = point.material.opacity.at::<All>(context.scene, point.uv);
-        let met_again = hit.triangle == start.triangle || (segments == 1 && point.is_left_by(&ray));
-        let transparent =
-            point.material.has_cutout() && sampler.single(dimension::opacity(segments, crossings)) >= opacity;
-        if met_again || transparent {
+        // Skipped surface: by rounding, or a cut-out or pane.
+        let opacity = || sampler.single(dimension::opacity(segments, crossings));
+        let is_left = segments == 1 && point.is_left_by(&ray);
+        let passed = || context.passed(&point, (&ray, &hit), start.triangle, opacity);
+        if let Some(factor) = is_left.then_some(Rgb::ONE).or_else(passed) {
+            throughput *= factor;
             (start.ray, start.triangle) = (point.spawn(direction), hit.triangle);
             crossings += 1;
             continue;

@@ -118,6 +118,7 @@ impl VisiblePointSampler {
         for segments in 1..=MAX_MIRRORS + 1 {
             let opacity = |n| sampler.single(dimension::CROSSING + n);
             let (hit, point) = context.next_surface(&mut segment, opacity, counters)?;
+            throughput *= segment.passed;
             let direction = Vec3::from(segment.ray.direction).normalize_or_zero();
             let bsdf = context.bsdf_at(&point);
             if bsdf.gathers_photons(true) && !mem::take(&mut gathers) {

@@ -9,7 +9,6 @@
 //! Visibility tables pay if most of the environment is hidden, as in a room, and cost a little otherwise. The
 //! same rays estimate the gain.
 
-use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::geometry::{Bounds, Hit, Ray};
@@ -366,8 +365,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         if !self.context.has_cutouts {
             return 0.0;
         }
-        let Some((rest, transmittance)) = self.context.pass_cutout(ray, hit) else { return 0.0 };
-        let light = Rgb::splat(transmittance);
-        self.context.transmit(rest, light, &mut 0).unwrap_or_default().x
+        let Some((rest, light)) = self.context.pass_cutout(ray, hit) else { return 0.0 };
+        self.context.transmit(rest, light, &mut 0).unwrap_or_default().max_element()
     }
 }

@@ -1,13 +1,13 @@
 //! Scene, BVH, lights and instruction set of transport, and the walk from surface to surface of all subpaths.
 
-use crate::Level;
-use crate::bsdf::{Bsdf, Features};
+use crate::bsdf::{Bsdf, Features, Pane};
 use crate::bvh::{Bvh, Coherence};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::LightSampler;
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::settings::Counters;
 use crate::transport::walk::termination::MAX_CROSSINGS;
+use crate::{Level, Rgb};
 use bytemuck::{Pod, Zeroable};
 use core::marker::PhantomData;
 use glam::Vec3;
@@ -50,17 +50,20 @@ pub(crate) struct Segment {
     pub(crate) surfaces: u32,
     /// Distance from the last scattering surface, in lengths of the ray's direction.
     pub(crate) length: f32,
+    /// Factor on the throughput by panes since then.
+    pub(crate) passed: Rgb,
 }
 
 impl Segment {
     /// First segment of a subpath, from the camera or a light.
     pub(crate) fn first(ray: Ray) -> Self {
-        Self { ray, triangle: MISS, surfaces: 0, length: 0.0 }
+        Self { ray, triangle: MISS, surfaces: 0, length: 0.0, passed: Rgb::ONE }
     }
 
     /// Next segment, from `point` on the triangle of `hit` along `direction`, in world space.
     pub(crate) fn onward(&self, point: &SurfacePoint, hit: &Hit, direction: Vec3) -> Self {
-        Self { ray: point.spawn(direction), triangle: hit.triangle, surfaces: self.surfaces + 1, length: 0.0 }
+        let (ray, surfaces) = (point.spawn(direction), self.surfaces + 1);
+        Self { ray, triangle: hit.triangle, surfaces, length: 0.0, passed: Rgb::ONE }
     }
 }
 
@@ -121,42 +124,67 @@ impl<'a, F: Features> SceneContext<'a, F> {
         !self.has_hidden_light()
     }
 
-    /// True if a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`
-    /// (evaluated for cut-outs only), or the ray's own triangle, hit by rounding.
+    /// Factor on the throughput of a ray from triangle `left` that skips `point`, its hit; `None` if it stops
+    /// there. It skips a cut-out or pane whose opacity does not exceed `random` (evaluated for those only),
+    /// and its own triangle, hit by rounding.
     #[inline]
-    pub(crate) fn is_skipped(
+    pub(crate) fn passed(
         &self,
         point: &SurfacePoint,
-        hit: &Hit,
+        (ray, hit): (&Ray, &Hit),
         left: u32,
         random: impl FnOnce() -> f32,
-    ) -> bool {
-        hit.triangle == left || F::CUTOUT && point.material.has_cutout() && random() >= self.opacity_at(point)
+    ) -> Option<Rgb> {
+        if hit.triangle == left {
+            return Some(Rgb::ONE);
+        }
+        if !(F::CUTOUT && point.material.has_cutout()) {
+            return None;
+        }
+        let Some(passing) = self.passing_pane(point, ray) else {
+            return (random() >= self.opacity_at(point)).then_some(Rgb::ONE);
+        };
+        let most = passing.max_element();
+        (random() >= 1.0 - most).then(|| passing / most)
+    }
+
+    /// Part of the light along `ray` that passes `point` straight on, if that is on a pane.
+    #[inline]
+    fn passing_pane(&self, point: &SurfacePoint, ray: &Ray) -> Option<Rgb> {
+        let pane = Pane::of(&point.material.surface)?;
+        let [_, passing] = pane.parts(point.frame.normal.dot(Vec3::from(ray.direction).normalize_or_zero()));
+        Some(Rgb::ONE - self.opacity_at(point).max(0.0) * (Rgb::ONE - passing))
+    }
+
+    /// Part of the light along `ray` that passes `point` straight on, by cut-out or pane.
+    #[inline]
+    pub(crate) fn passing(&self, point: &SurfacePoint, ray: &Ray) -> Rgb {
+        let by_opacity = || Rgb::splat(1.0 - self.opacity_at(point).clamp(0.0, 1.0));
+        self.passing_pane(point, ray).unwrap_or_else(by_opacity)
     }
 
     /// `Err` if a `ray` from `origin` passes `point`, its `hit`: the ray behind it, or `None` after
-    /// [`MAX_CROSSINGS`] surfaces. A ray that is `at_lens` does not see the back of the surface that the
-    /// camera is on. A cut-out after n others uses `random(n)`.
+    /// [`MAX_CROSSINGS`] surfaces. A coloured pane changes the `throughput`. A ray that is `at_lens` does not
+    /// see the back of the surface that the camera is on. A cut-out after n others uses `random(n)`.
     #[inline]
     pub(crate) fn stop(
         &self,
-        origin: &mut Origin,
+        (origin, throughput): (&mut Origin, &mut [f32; 3]),
         (ray, hit, point): (&Ray, &Hit, &SurfacePoint),
         at_lens: bool,
         random: impl FnOnce(u32) -> f32,
         counters: &mut Counters,
     ) -> Result<(), Option<Ray>> {
         let Origin { triangle, crossings } = *origin;
-        let is_passed =
-            at_lens && point.is_left_by(ray) || self.is_skipped(point, hit, triangle, || random(crossings));
-        if !is_passed {
-            return Ok(());
-        }
+        let is_left = at_lens && point.is_left_by(ray);
+        let passed = || self.passed(point, (ray, hit), triangle, || random(crossings));
+        let Some(factor) = is_left.then_some(Rgb::ONE).or_else(passed) else { return Ok(()) };
         if crossings >= MAX_CROSSINGS {
             counters.dropped.unfinished += 1;
             return Err(None);
         }
         *origin = Origin { triangle: hit.triangle, crossings: crossings + 1 };
+        *throughput = (Rgb::from(*throughput) * factor).to_array();
         Err(Some(point.spawn(ray.direction.into())))
     }
 
@@ -190,16 +218,17 @@ impl<'a, F: Features> SceneContext<'a, F> {
         loop {
             let point = self.surface_at(&segment.ray, &hit)?;
             let (surfaces, length) = (segment.surfaces, segment.length + hit.t);
-            if !self.is_skipped(&point, &hit, segment.triangle, || random(surfaces)) {
+            let passed = self.passed(&point, (&segment.ray, &hit), segment.triangle, || random(surfaces));
+            let Some(factor) = passed else {
                 segment.length = length;
                 return Some((hit, point));
-            }
+            };
             if surfaces >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;
                 return None;
             }
             let onward = segment.onward(&point, &hit, segment.ray.direction.into());
-            *segment = Segment { length, ..onward };
+            *segment = Segment { length, passed: segment.passed * factor, ..onward };
             counters.rays += 1;
             hit = self.nearest(&segment.ray);
         }

@@ -305,7 +305,9 @@ impl<'a, F: Features> LightWalk<'a, F> {
         let segments = state.segments;
         let opacity = |crossings| numbers.single(dimension::opacity(segments, crossings));
         let end = (ray, hit, &point);
-        if let Err(behind) = self.context.stop(&mut state.start, end, false, opacity, counters) {
+        if let Err(behind) =
+            self.context.stop((&mut state.start, &mut state.power), end, false, opacity, counters)
+        {
             return behind;
         }
         if state.segments >= self.max_depth {

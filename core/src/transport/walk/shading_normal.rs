@@ -21,7 +21,7 @@ pub(super) fn is_bent(point: &SurfacePoint, bsdf: &Bsdf) -> bool {
             Bsdf::Diffuse(_) => true,
             Bsdf::Conductor(_) => !bsdf.is_delta(),
             Bsdf::Glossy(_) | Bsdf::Plastic(_) => bsdf.has_rough_coat(),
-            Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::RoughDielectric(_) => false,
+            Bsdf::Mirror(_) | Bsdf::Pane(_) | Bsdf::Dielectric(_) | Bsdf::RoughDielectric(_) => false,
         }
 }
 

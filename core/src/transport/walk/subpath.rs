@@ -132,7 +132,8 @@ impl<F: Features> Walk<'_, F> {
         let segments = subpath.segments;
         let random = |crossings| opacity(segments - 1 + crossings);
         let at_lens = from_camera && segments == 1;
-        self.context.stop(&mut subpath.origin, (ray, hit, point), at_lens, random, counters)
+        let state = (&mut subpath.origin, &mut subpath.throughput);
+        self.context.stop(state, (ray, hit, point), at_lens, random, counters)
     }
 
     /// The vertex where a camera subpath arrives.

@@ -1,4 +1,4 @@
-//! Shadow rays from a surface point to a light, and their transmittance through cut-outs.
+//! Shadow rays from a surface point to a light, and their transmittance through cut-outs and panes.
 
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -176,17 +176,16 @@ impl<F: Features> SceneContext<'_, F> {
     }
 
     /// Rest of a shadow ray behind `hit`, and the transmittance; `None` at an opaque surface.
-    pub(crate) fn pass_cutout(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
+    pub(crate) fn pass_cutout(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, Rgb)> {
         // Most surfaces are opaque: leave before the surface point is computed.
         let triangle = self.scene.mesh.triangles.get(hit.triangle as usize)?;
         if !self.scene.materials.get(triangle.material as usize)?.has_cutout() {
             return None;
         }
         let point = self.surface_at(ray, hit)?;
-        let opacity = point.material.opacity.at::<F>(self.scene, point.uv);
-        let transmittance = 1.0 - opacity.clamp(0.0, 1.0);
+        let transmittance = self.passing(&point, ray);
         // A NaN transmits nothing.
-        (transmittance > 0.0).then(|| {
+        (transmittance.max_element() > 0.0).then(|| {
             let direction = Vec3::from(ray.direction);
             let rest = match ray.t_max {
                 f32::INFINITY => point.spawn(direction),

@@ -202,6 +202,11 @@ impl Reader<'_, '_> {
         mtl: &mut MtlMaterial,
     ) {
         let part = transmission.transmission_factor;
+        if mtl.metallic.is_some_and(|metallic| metallic >= 1.0)
+            && self.maps.iter().all(|map| map.kind != MapKind::Metallic)
+        {
+            return self.note("is metal and transmits nothing");
+        }
         if transmission.transmission_texture.is_some() {
             self.note("`transmissionTexture` is not supported: left out");
         }
@@ -210,11 +215,6 @@ impl Reader<'_, '_> {
         }
         if part < 1.0 {
             self.note(&format!("transmits {part} of the light: it is clear"));
-        }
-        if mtl.metallic.is_some_and(|metallic| metallic >= 1.0)
-            && self.maps.iter().all(|map| map.kind != MapKind::Metallic)
-        {
-            return self.note("is metal and transmits nothing");
         }
         let color = mtl.diffuse.unwrap_or([1.0; 3]);
         let has_texture = self.maps.iter().any(|map| map.kind == MapKind::Diffuse);
@@ -230,17 +230,13 @@ impl Reader<'_, '_> {
                 let tint = core::array::from_fn(|i| (color[i] * absorbed[i]).max(0.0).sqrt());
                 (mtl.illumination, mtl.surely_glass, mtl.tint) = (Some(7), true, Some(tint));
             }
-            None => self.pane(color, mtl),
+            None => {
+                if mtl.roughness != Some(0.0) {
+                    self.note("its pane is smooth: the roughness is left out");
+                }
+                (mtl.pane, mtl.tint) = (true, Some(color));
+            }
         }
-    }
-
-    /// A thin pane of this colour, as a cut-out.
-    fn pane(&mut self, color: [f64; 3], mtl: &mut MtlMaterial) {
-        let ior = mtl.ior.unwrap_or(DEFAULT_IOR);
-        let reflectance = ((ior - 1.0) / (ior + 1.0)).powi(2);
-        (mtl.diffuse, mtl.metallic, mtl.roughness) = (Some([1.0; 3]), Some(1.0), Some(0.0));
-        mtl.opacity = Some(2.0 * reflectance);
-        self.note(&format!("its thin pane is a cut-out: its colour {color:?} is left out"));
     }
 
     /// Adds a map by a texture.

@@ -21,6 +21,8 @@ pub enum MaterialKind {
     Mirror,
     /// A boundary between two media.
     Glass,
+    /// Two parallel faces in air, as of a window.
+    Pane,
 }
 
 /// Reflectance of a mirror without `color`.
@@ -52,7 +54,7 @@ pub struct MaterialEntry {
     pub metallic_map: Option<Spanned<String>>,
     /// Index of refraction (`Ni`).
     pub ior: Option<RefractiveIndex>,
-    /// Factor on the transmission of glass (`Tf`).
+    /// Factor on the transmission of glass (`Tf`), or of the body of a pane.
     pub tint: Option<Reflectance>,
     /// Probability that a ray hits the surface (`d`).
     pub opacity: Option<Fraction>,
@@ -95,6 +97,7 @@ impl MaterialEntry {
             opacity: fraction(self.opacity),
             roughness: fraction(self.roughness),
             metallic: fraction(self.metallic),
+            pane: self.kind == Some(MaterialKind::Pane),
             surely_glass: self.kind == Some(MaterialKind::Glass),
             ..MtlMaterial::default()
         };
@@ -147,6 +150,8 @@ impl MaterialKind {
                 }
             }
             Self::Glass => material.illumination = Some(7),
+            // Its faces are smooth.
+            Self::Pane => material.roughness = None,
         }
     }
 }
@@ -175,6 +180,7 @@ impl MaterialChange {
         replace!(diffuse specular emission tint shininess ior opacity roughness metallic illumination);
         material.maps.extend(change.maps);
         material.surely_glass |= change.surely_glass;
+        material.pane |= change.pane;
         material.surely_reflects |= change.specular.is_some();
         material.two_sided = self.two_sided.unwrap_or(material.two_sided);
         if let (Some(map), Some(scale)) = (material.maps.get_mut(&MapKind::Bump), self.bump_scale) {

@@ -108,3 +108,16 @@ fn transmission_with_a_volume_is_solid_glass() {
     let tint = Rgb::from([1.0, 0.5, 0.5]);
     assert_eq!(glass.materials[0].surface, Surface::Dielectric { ior: 1.25, tint, roughness: 0.0.into() });
 }
+
+#[test]
+fn transmission_without_a_volume_is_a_pane() {
+    let material = |factor: f64| {
+        json!({ "pbrMetallicRoughness": { "baseColorFactor": [1, 0.5, 0.25, 1], "metallicFactor": 0, "roughnessFactor": 0 },
+            "extensions": { "KHR_materials_transmission": { "transmissionFactor": factor } } })
+    };
+    let pane = scene(material(1.0));
+    assert_eq!(pane.materials[0].surface, Surface::Pane { ior: 1.5, tint: [1.0, 0.5, 0.25].into() });
+    assert!(pane.repairs.is_empty(), "{:?}", pane.repairs);
+    let opaque = scene(material(0.25));
+    assert!(matches!(opaque.materials[0].surface, Surface::Glossy { .. }) && says(&opaque, &["opaque"]));
+}
