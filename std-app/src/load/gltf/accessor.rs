@@ -1,10 +1,9 @@
 //! Accessors: typed arrays in buffers, with stride, normalisation and sparse substitutes. Ranges are checked
 //! once; a look-up then cannot leave its buffer.
 
-use super::json::{Accessor, BufferView, Document, SparsePart};
+use super::json::{Accessor, BufferView, Document, Sparse};
 use crate::load::bytes::Bytes;
 use crate::load::error::LoadError;
-use std::collections::HashMap;
 use std::path::Path;
 
 const BYTE: u32 = 5120;
@@ -26,7 +25,25 @@ pub(super) struct Rows<const N: usize> {
     pub(super) count: usize,
     /// `None`: zeros.
     dense: Option<Array<N>>,
-    substitutes: HashMap<usize, [f64; N]>,
+    sparse: Option<Substitutes<N>>,
+}
+
+/// Rows that replace others, by ascending index.
+struct Substitutes<const N: usize> {
+    count: usize,
+    indices: Array<1>,
+    values: Array<N>,
+}
+
+impl<const N: usize> Substitutes<N> {
+    fn row(&self, row: usize) -> Option<[f64; N]> {
+        let (mut low, mut high) = (0, self.count);
+        while low < high {
+            let middle = low.midpoint(high);
+            if self.indices.row(middle)[0] < row as f64 { low = middle + 1 } else { high = middle }
+        }
+        (low < self.count && self.indices.row(low)[0] == row as f64).then(|| self.values.row(low))
+    }
 }
 
 /// Rows in a buffer, all of which exist.
@@ -83,12 +100,8 @@ impl<const N: usize> Rows<N> {
     /// Row number `row`; zeros beyond the end.
     #[inline]
     pub(super) fn row(&self, row: usize) -> [f64; N] {
-        if !self.substitutes.is_empty()
-            && let Some(substitute) = self.substitutes.get(&row)
-        {
-            return *substitute;
-        }
-        self.dense.as_ref().map_or([0.0; N], |array| array.row(row))
+        let dense = || self.dense.as_ref().map_or([0.0; N], |array| array.row(row));
+        self.sparse.as_ref().and_then(|sparse| sparse.row(row)).unwrap_or_else(dense)
     }
 }
 
@@ -121,29 +134,33 @@ impl Buffers<'_> {
         let dense = accessor.buffer_view.map(|view| {
             self.array::<N>(view, accessor.byte_offset, component, count.into()).map_err(|why| error(&why))
         });
-        let mut rows = Rows { count: count as usize, dense: dense.transpose()?, substitutes: HashMap::new() };
-        if let Some(sparse) = &accessor.sparse {
-            let part = |part: &SparsePart, kind, normalized| -> Result<_, String> {
-                let component = Component::new(kind, normalized).ok_or("has unknown sparse indices")?;
-                Ok((part.buffer_view, part.byte_offset, component))
-            };
-            let mut read = || -> Result<(), String> {
-                let (view, offset, index) = part(&sparse.indices, sparse.indices.component_type, false)?;
-                let indices = self.array::<1>(view, offset, index, sparse.count)?;
-                let (view, offset, value) = part(&sparse.values, component_type, normalized)?;
-                let values = self.array::<N>(view, offset, value, sparse.count)?;
-                for i in 0..sparse.count as usize {
-                    let [index] = indices.row(i);
-                    if !(0.0..f64::from(count)).contains(&index) {
-                        return Err(format!("substitutes element {index} of {count}"));
-                    }
-                    rows.substitutes.insert(index as usize, values.row(i));
-                }
-                Ok(())
-            };
-            read().map_err(|why| error(&why))?;
+        let sparse = accessor
+            .sparse
+            .as_ref()
+            .map(|sparse| self.substitutes::<N>(sparse, component, count).map_err(|why| error(&why)));
+        Ok(Rows { count: count as usize, dense: dense.transpose()?, sparse: sparse.transpose()? })
+    }
+
+    /// Substitutes for rows of `count`, whose indices must ascend.
+    fn substitutes<const N: usize>(
+        &self,
+        sparse: &Sparse,
+        component: Component,
+        count: u32,
+    ) -> Result<Substitutes<N>, String> {
+        let Sparse { count: own, indices, values } = sparse;
+        let index = Component::new(indices.component_type, false).ok_or("has unknown sparse indices")?;
+        let indices = self.array::<1>(indices.buffer_view, indices.byte_offset, index, *own)?;
+        let values = self.array::<N>(values.buffer_view, values.byte_offset, component, *own)?;
+        let mut least = 0.0;
+        for i in 0..*own as usize {
+            let [index] = indices.row(i);
+            if !(least..f64::from(count)).contains(&index) {
+                return Err(format!("substitutes element {index} of {count}, or in no order"));
+            }
+            least = index + 1.0;
         }
-        Ok(rows)
+        Ok(Substitutes { count: *own as usize, indices, values })
     }
 
     /// `count` rows of a buffer view.
