@@ -13,6 +13,9 @@ const CAMERA: &str = "Camera [default: that of the scene file, or one that frame
 /// Camera in the units of the scene.
 #[derive(Args)]
 pub(super) struct CameraArgs {
+    /// Camera of a glTF file, by its name or its number from 1 [default: the first]
+    #[arg(long, value_name = "NAME", help_heading = CAMERA)]
+    camera: Option<String>,
     /// Position of the camera
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true,
         help_heading = CAMERA)]
@@ -36,9 +39,13 @@ pub(super) struct CameraArgs {
 impl CameraArgs {
     /// Camera of `scene` with these flags, in the coordinates of the core.
     pub(super) fn camera(&self, scene: &LoadedScene) -> Result<Camera, Failure> {
-        let (mut camera, mut view) = (scene.camera_or_default(), scene.view);
+        let (mut camera, mut view) = match &self.camera {
+            Some(name) => named(name, scene)?,
+            None => (scene.camera_or_default(), scene.view),
+        };
+        let file_view = view;
         if self.eye.is_some() || self.look_at.is_some() || self.up.is_some() {
-            let (moved, moved_view) = self.moved(&camera, scene)?;
+            let (moved, moved_view) = self.moved(&camera, file_view, scene)?;
             (camera, view) = (moved, Some(moved_view));
         }
         if let Some(degrees) = self.fov {
@@ -54,9 +61,13 @@ impl CameraArgs {
     }
 
     /// Camera with another position or direction.
-    fn moved(&self, old: &Camera, scene: &LoadedScene) -> Result<(Camera, View), Failure> {
+    fn moved(
+        &self,
+        old: &Camera,
+        file: Option<View>,
+        scene: &LoadedScene,
+    ) -> Result<(Camera, View), Failure> {
         let to_user = |point| scene.transform.to_user(point);
-        let file = scene.view;
         let eye = self.eye.unwrap_or_else(|| file.map_or_else(|| to_user(old.eye), |file| file.eye));
         let look_at = match (self.look_at, self.eye) {
             (Some(target), _) => target,
@@ -81,4 +92,20 @@ impl CameraArgs {
         let focus_distance = if has_target { moved.focus_distance } else { old.focus_distance };
         Ok((Camera { tan_half_fov, lens_radius, focus_distance, ..moved }, view))
     }
+}
+
+/// The camera of the scene with this name or number.
+fn named(name: &str, scene: &LoadedScene) -> Result<(Camera, Option<View>), Failure> {
+    let cameras = &scene.cameras;
+    let by_number = || name.parse::<usize>().ok().and_then(|number| cameras.get(number.checked_sub(1)?));
+    let found = cameras.iter().find(|camera| camera.name == name).or_else(by_number);
+    let camera = found.and_then(|found| Some((scene.camera_at(found.view, found.fov_degrees)?, found.view)));
+    camera.map(|(camera, view)| (camera, Some(view))).ok_or_else(|| {
+        let names: Vec<&str> = cameras.iter().map(|camera| &camera.name[..]).collect();
+        let advice = match names.len() {
+            0 => "its files have none; --eye and --look-at place one".into(),
+            _ => format!("it has {}", names.join(", ")),
+        };
+        Failure::new(format!("the scene has no camera `{name}`")).advice(advice)
+    })
 }

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::stdio::print_result;
 use super::values;
 use clap::Args;
-use halflight::load::{self, LoadOptions, LoadedScene};
+use halflight::load::{self, LoadOptions, LoadedScene, NamedCamera};
 use halflight::quantity::{readable_bytes, readable_name};
 use halflight::report::{counts, left_out_array};
 use halflight_core::bvh::Bvh;
@@ -49,6 +49,7 @@ impl Info {
             plan: census.plan(),
             camera: CameraFacts::new(&scene.camera, &loaded),
             counts: counts(&census, &scene),
+            cameras: &loaded.cameras,
             repairs: &loaded.repairs,
         };
         print_result(&if self.json { facts.object().to_string() } else { facts.text() })?;
@@ -75,6 +76,7 @@ impl CameraFacts {
 }
 
 struct Facts<'a> {
+    cameras: &'a [NamedCamera],
     repairs: &'a [String],
     camera: CameraFacts,
     counts: Vec<(&'static str, u64)>,
@@ -94,6 +96,7 @@ impl Facts<'_> {
             "features": self.plan.features.name(),
             "census": counts.collect::<Map<_, _>>(),
             "camera": camera,
+            "cameras": self.cameras.iter().map(|camera| camera.name.as_str()).collect::<Value>(),
             "memory": memory.collect::<Map<_, _>>(),
             "left_out": left_out_array(self.plan.left_out()),
             "repairs": self.repairs,
@@ -112,6 +115,10 @@ impl Facts<'_> {
             format!("  --{:<22} {x:.6},{y:.6},{z:.6}", name.replace('_', "-"))
         }));
         lines.push(format!("  --{:<22} {:.3}", "fov", self.camera.fov));
+        let named = |(number, camera): (usize, &NamedCamera)| {
+            line("camera", format!("--camera {} ({})", number + 1, camera.name))
+        };
+        lines.extend(self.cameras.iter().enumerate().map(named));
         lines.push("plan".into());
         lines.push(format!("  compiled for: {}", self.plan.features.name()));
         lines.extend(self.plan.left_out().map(|(what, why)| format!("  left out: {what} ({why})")));

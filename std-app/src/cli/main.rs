@@ -18,6 +18,7 @@ mod render;
 mod stdio;
 mod summary;
 mod values;
+mod view_args;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;

@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
 use super::summary;
+use super::view_args::ViewArgs;
 use clap::Args;
 use halflight::render::{self, Merged};
 use halflight::report::{dropped_object, error_object, file_name, findings_object};
@@ -22,6 +23,8 @@ pub(super) struct Merge {
     /// Picture: .png, .exr, .hdr or .pfm; may be repeated
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
+    #[command(flatten)]
+    view: ViewArgs,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
@@ -33,7 +36,8 @@ impl Merge {
         self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
         self.films.iter().try_for_each(|film| outputs.protect(film))?;
         let merged = render::merge(&self.films)?;
-        let saved = outputs.save_to(&self.output, &merged.image);
+        let shown = self.view.shown(&merged.image, &self.output);
+        let saved = outputs.save_to(&self.output, &merged.image, &shown);
         let results =
             if self.json { self.object(&merged, &saved).to_string() } else { text(&merged, &saved) };
         Ok(outputs.end(&results, ExitCode::SUCCESS))

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::interrupt::INTERRUPT;
 use super::stdio::{print_message, print_result};
 use halflight::report::{self, Files};
-use halflight::save::{self, Destination, Identity, Image, Patience};
+use halflight::save::{self, Destination, Format, Identity, Image, Patience};
 use std::io::{self, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -156,14 +156,23 @@ impl Outputs {
         saved.map_err(|error| self.fail(error)).is_ok()
     }
 
-    /// Writes a picture to all of `paths`, to files before pipes, whose readers may be slow; returns those
-    /// written.
-    pub(super) fn save_to<'p>(&mut self, paths: &'p [PathBuf], image: &Image) -> Vec<&'p PathBuf> {
+    /// Writes a picture to all of `paths`, PNG files as they are `shown`, to files before pipes, whose
+    /// readers may be slow; returns those written.
+    pub(super) fn save_to<'p>(
+        &mut self,
+        paths: &'p [PathBuf],
+        image: &Image,
+        shown: &Image,
+    ) -> Vec<&'p PathBuf> {
+        let of = |path: &Path| match Format::of(path).is_ok_and(Format::is_linear) {
+            true => image,
+            false => shown,
+        };
         let is_stream =
             |path: &PathBuf| Destination::of(path).is_ok_and(|destination| destination.is_stream());
         let mut order: Vec<usize> = (0..paths.len()).collect();
         order.sort_by_key(|&i| is_stream(&paths[i]));
-        order.retain(|&i| self.save(&paths[i], image));
+        order.retain(|&i| self.save(&paths[i], of(&paths[i])));
         order.sort_unstable();
         order.into_iter().map(|i| &paths[i]).collect()
     }

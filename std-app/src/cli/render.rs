@@ -5,6 +5,7 @@ use super::interrupt::{self, INTERRUPT};
 use super::outputs::{Outputs, Role};
 use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, note_darkness, render_failure};
 use super::progress::ProgressReporter;
+use super::view_args::ViewArgs;
 use super::{print_note, summary, values};
 use clap::Args;
 use halflight::compare::compare;
@@ -35,6 +36,8 @@ pub(super) struct Render {
     method_args: MethodArgs,
     #[command(flatten)]
     picture: PictureArgs,
+    #[command(flatten)]
+    view: ViewArgs,
 
     /// Samples per pixel. Without --spp, --time and --error a render ends at relMSE 1e-3 or after 60 s; a
     /// shard has 256 samples
@@ -125,7 +128,8 @@ impl Render {
         let result = result.map_err(|error| render_failure(&self.scene, &error))?;
 
         result.unsaved.iter().for_each(|error| outputs.fail(error.clone()));
-        let saved: Vec<_> = outputs.save_to(&pictures, &result.image).into_iter().cloned().collect();
+        let shown = self.view.shown(&result.image, &pictures);
+        let saved: Vec<_> = outputs.save_to(&pictures, &result.image, &shown).into_iter().cloned().collect();
         let comparison =
             settings.reference.as_ref().map(|reference| compare(&result.image, reference)).transpose()?;
         let run = Run {

@@ -6,6 +6,7 @@ mod format;
 mod image;
 mod partial_file;
 mod stream;
+mod view;
 
 pub use crate::file_error::FileError;
 pub use crate::picture::MAX_PIXELS;
@@ -16,3 +17,4 @@ pub use format::{Format, encode};
 pub use image::{Image, display_byte, from_srgb, to_srgb};
 pub use partial_file::abandon;
 pub use stream::Patience;
+pub use view::{Curve, ViewTransform, automatic_stops};

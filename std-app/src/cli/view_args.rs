@@ -1,0 +1,64 @@
+//! Flags of the view that PNG files show.
+
+use super::print_note;
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use halflight::save::{Curve, Format, Image, ViewTransform, automatic_stops};
+use std::borrow::Cow;
+use std::path::PathBuf;
+
+/// Exposure and curve of PNG files; other formats are linear.
+#[derive(Args)]
+pub(super) struct ViewArgs {
+    /// Stops by which PNG files are brightened, or `auto`: their geometric mean becomes middle grey
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = exposure,
+        allow_hyphen_values = true, help_heading = "Results")]
+    exposure: Exposure,
+    /// Curve of PNG files: colours above 1 are cut, or compressed as by Khronos PBR Neutral or AgX
+    #[arg(long, value_name = "CURVE", default_value = "clamp", help_heading = "Results",
+        value_parser = PossibleValuesParser::new(["clamp", "neutral", "agx"])
+            .map(|name| name.parse::<Curve>().unwrap_or_default()))]
+    view: Curve,
+}
+
+/// Value of `--exposure`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Exposure {
+    Stops(f32),
+    Auto,
+}
+
+/// Largest exposure: the picture of a candle in sunlight.
+const MOST_STOPS: f32 = 60.0;
+
+fn exposure(text: &str) -> Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    let stops = text.parse::<f32>().ok().filter(|stops| stops.abs() <= MOST_STOPS);
+    stops.map(Exposure::Stops).ok_or(format!("a number from -{MOST_STOPS} to {MOST_STOPS}, or `auto`"))
+}
+
+impl ViewArgs {
+    /// What PNG files show of a picture. Notes a picture of which a PNG file among `files` shows nothing,
+    /// with the exposure that would.
+    pub(super) fn shown<'i>(&self, image: &'i Image, files: &[PathBuf]) -> Cow<'i, Image> {
+        let automatic = || automatic_stops(image);
+        let stops = match self.exposure {
+            Exposure::Stops(stops) => stops,
+            Exposure::Auto => automatic(),
+        };
+        let view = ViewTransform { stops, curve: self.view };
+        let is_png = |file: &PathBuf| Format::of(file).is_ok_and(|format| !format.is_linear());
+        if let Some(fault) = view.fault(image)
+            && self.exposure != Exposure::Auto
+            && files.iter().any(is_png)
+        {
+            print_note(format!(
+                "the picture is nearly all {fault}: --exposure {} would show it",
+                automatic()
+            ));
+        }
+        view.shown(image)
+    }
+}
