@@ -40,8 +40,8 @@ fn exposure(text: &str) -> Result<Exposure, String> {
 }
 
 impl ViewArgs {
-    /// What PNG files show of a picture. Notes a picture of which a PNG file among `files` shows nothing,
-    /// with the exposure that would.
+    /// The picture as PNG files show it. Notes one of which a PNG file among `files` shows nothing, with the
+    /// exposure that would.
     pub(super) fn shown<'i>(&self, image: &'i Image, files: &[PathBuf]) -> Cow<'i, Image> {
         let automatic = || automatic_stops(image);
         let stops = match self.exposure {
