@@ -65,7 +65,7 @@ fn what_is_refused_names_its_line() {
     let missing = Files::new(&[]).load("no.obj").unwrap_err();
     assert!(missing.to_string().contains("cannot be read"), "{missing}");
     let kind = Files::new(&[("a.ply", b"")]).load("a.ply").unwrap_err();
-    assert!(kind.to_string().contains(".obj or .toml"), "{kind}");
+    assert!(kind.to_string().contains(".obj, .glb, .gltf or .toml"), "{kind}");
 }
 
 #[test]
