@@ -341,6 +341,28 @@ def keyhole():
     model.write("keyhole", HARD, **INSIDE)
 
 
+def mirror_ball():
+    """The caustic of a small lamp by a small mirror ball."""
+    model = Model()
+    closed_room(model)
+    model.use("ball", "Kd 0.9 0.9 0.9\nPm 1\nPr 0")
+    model.sphere([0.3, -0.8, 0.2], 0.2, 3, smooth=True)
+    model.use("lamp", "Kd 0 0 0\nKe 5333 4800 4267")
+    model.quad([-0.015, 0.99, -0.015], [0.03, 0, 0], [0, 0, 0.03])
+    model.write("mirror-ball", HARD, **INSIDE)
+
+
+def glass_ball():
+    """A ball of glass under a wide lamp."""
+    model = Model()
+    closed_room(model)
+    model.use("ball", PANE)
+    model.sphere([0.0, -0.5, 0.0], 0.5, 3, smooth=True)
+    model.use("lamp", "Kd 0 0 0\nKe 4.8 4.32 3.84")
+    model.quad([-0.5, 0.99, -0.5], [1, 0, 0], [0, 0, 1])
+    model.write("glass-ball", HARD, **INSIDE)
+
+
 def rings():
     """Caustics of metal rings on a table."""
     model = Model()
@@ -360,7 +382,7 @@ def rings():
 
 SCENES = [diffuse, mirror, glass, rough_glass, metal, plastic, varnish, textured, point, spot, directional]
 SCENES += [constant, lens, many_lights, bent_normals, smooth_normals]
-SCENES += [up_light, glass_lamp, keyhole, rings]
+SCENES += [up_light, glass_lamp, keyhole, mirror_ball, glass_ball, rings]
 
 if __name__ == "__main__":
     HARD.mkdir(parents=True, exist_ok=True)

@@ -39,7 +39,7 @@ SCENES = {
     "sponza-dabrovic": "path", "veach-ajar": "path", "veach-door": "bdpt",
     "veach-bidir": "bdpt", "lux-causticcube": "sppm", "torus": "path", "caustic-glass": "vcm",
     "water-caustic": "sppm", "two-rooms": "bdpt", "glossy": "path", "caustic": "path", "up-light": "path",
-    "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "path",
+    "glass-lamp": "sppm", "keyhole": "bdpt", "rings": "path", "mirror-ball": "sppm", "glass-ball": "sppm",
 }
 
 

@@ -9,7 +9,7 @@ use glam::Vec3;
 use halflight::render::{self, Checkpoint, Ending, Method, Progress, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
 use halflight_core::findings::Value;
-use halflight_core::scene::{Camera, Material};
+use halflight_core::scene::{Camera, Material, Scene};
 use halflight_simd::Level;
 use halflight_tests::render::{number, raw, render};
 use halflight_tests::scenes::{SceneBuffers, box_from_above, emitter, metal};
@@ -27,6 +27,20 @@ fn room_with_up_light() -> SceneBuffers {
     buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
     buffers.square(Vec3::new(0.5, 0.6, 0.5), Vec3::Y, 0.1, lamp);
     buffers.cuboid(Vec3::new(0.4, 0.5, 0.4), Vec3::new(0.6, 0.59, 0.6), false, wall);
+    buffers
+}
+
+/// A closed room with a small mirror ball, whose lamp is 3 cm wide.
+fn room_with_mirror_ball() -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.0, 0.1, 0.95), Vec3::new(0.0, -0.2, 0.0), Vec3::Y, 80.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
+    let lamp = buffers.material(emitter(0.0, 5000.0));
+    buffers.cuboid(Vec3::NEG_ONE, Vec3::ONE, true, wall);
+    buffers.square(Vec3::new(0.0, 0.99, 0.0), Vec3::NEG_Y, 0.03, lamp);
+    buffers.normals = vec![[0.0; 3]; buffers.positions.len()];
+    buffers.sphere(Vec3::new(0.3, -0.8, 0.2), 0.2, 24, mirror);
     buffers
 }
 
@@ -72,6 +86,20 @@ fn records_of_lobes_are_chosen_where_rough_reflections_are_most_of_the_noise() {
             ["irradiance-cache", "radiance-cache"].map(|method| number(&result, "method", method));
         assert!(irradiance > 2.0 * radiance && radiance > 0.0, "{irradiance} {radiance}");
     }
+}
+
+#[test]
+fn photons_are_a_choice_where_a_small_lamp_has_a_caustic() {
+    let room = room_with_mirror_ball();
+    let predicted = |audit| {
+        let result = choice_alone(&room.scene(), |settings| {
+            (settings.stop.spp, settings.audit) = (Some(256), audit);
+        });
+        ["path", "sppm"].map(|method| number(&result, "method", method))
+    };
+    let [path, photons] = predicted(None);
+    assert!(path > 10.0 * photons && photons > 0.0, "{path} {photons}");
+    assert_eq!(predicted(Some(0.0))[1], 0.0, "nothing measures its blur");
 }
 
 #[test]
@@ -157,6 +185,15 @@ fn path_tracing_takes_the_place_of_a_chosen_method_whose_bias_exceeds_the_reques
     assert!(resumed.method == Method::Path && resumed.image.pixels == paths.image.pixels);
 }
 
+/// Choice for a picture of `scene`, which ends after its first round.
+fn choice_alone(scene: &Scene, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    let stopped = AtomicBool::new(false);
+    let mut stop_render = |_: &Progress| stopped.store(true, Ordering::Relaxed);
+    let mut settings = Settings { width: SIZE, height: SIZE, level: Level::BASELINE, ..raw() };
+    change(&mut settings);
+    render::render(scene, &settings, &mut stop_render, &stopped).expect("a picture")
+}
+
 /// Samples per pixel of the pictures of the snapshot.
 const BUDGETS: [u32; 3] = [16, 64, 1024];
 
@@ -167,20 +204,11 @@ fn choices() -> String {
         for spp in BUDGETS {
             let max_depth = scene.max_depth;
             scene.with(|scene| {
-                // The choice alone: the picture ends after its first round.
-                let stopped = AtomicBool::new(false);
-                let mut stop_render = |_: &Progress| stopped.store(true, Ordering::Relaxed);
-                let settings = Settings {
-                    width: SIZE,
-                    height: SIZE,
-                    max_depth,
-                    level: Level::BASELINE,
-                    stop: Stop { spp: Some(spp), ..Stop::default() },
-                    ..raw()
-                };
-                let result = render::render(scene, &settings, &mut stop_render, &stopped).expect("a picture");
+                let result = choice_alone(scene, |settings| {
+                    (settings.max_depth, settings.stop.spp) = (max_depth, Some(spp));
+                });
                 text += &format!("{:>5} spp {:<16}", spp, result.method.name());
-                for method in ["path", "irradiance-cache", "radiance-cache", "bdpt"] {
+                for method in ["path", "irradiance-cache", "radiance-cache", "bdpt", "sppm"] {
                     let predicted = result.findings.get("method").and_then(|finding| finding.number(method));
                     text += &predicted.map_or("  -      ".into(), |error| format!("  {error:.1e}"));
                 }

@@ -38,6 +38,8 @@ pub struct RenderState<'m> {
     pub shard: Shard,
     /// Sums over all tasks.
     pub counters: Counters,
+    /// Rays of the tiles among them.
+    pub rays_of_tiles: u64,
     /// True if errors of distant pixels are correlated, because a structure such as a cache serves them all.
     pub is_correlated: bool,
 }
@@ -59,7 +61,15 @@ impl<'m> RenderState<'m> {
         let (samples, dropped) = (arena.slice(tiles)?, arena.slice(tiles)?);
         samples.fill(0);
         dropped.fill(Dropped::default());
-        Ok(Self { film, samples, dropped, shard, counters: Counters::default(), is_correlated: false })
+        Ok(Self {
+            film,
+            samples,
+            dropped,
+            shard,
+            counters: Counters::default(),
+            rays_of_tiles: 0,
+            is_correlated: false,
+        })
     }
 
     /// Tiles of the shard.
@@ -138,7 +148,7 @@ impl<E: Executor> Round<'_, '_, E> {
         sample: impl Fn(usize, Range<u32>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync,
     ) -> Result<(), OutOfMemory> {
         let (end, step) = (end.min(self.target), self.step.max(1));
-        let RenderState { film, samples, dropped, shard, counters, .. } = &mut *self.state;
+        let RenderState { film, samples, dropped, shard, .. } = &mut *self.state;
         let pixels = film.pixels_mut().chunks_mut(PIXELS_PER_TILE);
         let tiles = pixels.zip(samples.iter_mut()).zip(dropped.iter_mut()).enumerate();
         let shard = *shard;
@@ -158,7 +168,8 @@ impl<E: Executor> Round<'_, '_, E> {
                 }
                 Ok(counters)
             })?;
-        *counters += passed.counters;
+        self.state.rays_of_tiles += passed.counters.all_rays();
+        self.count(passed);
         Ok(())
     }
 }

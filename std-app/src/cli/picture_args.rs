@@ -141,7 +141,7 @@ impl ValueEnum for MethodArg {
     fn to_possible_value(&self) -> Option<PossibleValue> {
         let about = self
             .0
-            .map_or("path, irradiance-cache or vcm: the one with the least predicted error", Method::about);
+            .map_or("path, a cache, bdpt or sppm: the one with the least predicted error", Method::about);
         Some(PossibleValue::new(self.name()).help(about))
     }
 }

@@ -3,18 +3,24 @@
 //! light; it includes the difference of the estimators of direct light.
 
 use super::Goal;
+use super::method_pilot::{MethodPilot, SAMPLES};
 use super::table::{Row, Table};
 use super::trial::{IRRADIANCE, RADIANCE, SUPPLIES, Trial};
 use crate::method::cache_resolution::{CacheResolution, CachedPicture};
 use crate::method::counts::{self, PilotNoise};
 use crate::method::tuned::{
     CACHED_RAY, COUNTS_RAYS, COUNTS_SHARE, FILLING_OF_LOBES, LEAST_GAIN, LEAST_GAIN_OF_LOBES,
-    LIGHT_PATHS_ERROR, PHOTONS_ERROR,
+    LIGHT_PATHS_ERROR, PHOTONS_ERROR, PROGRESSIVE_ERROR, RAYS_PER_SAMPLE,
 };
 use crate::method::{MethodKind, work_of_detail};
 
 /// Candidates.
-pub const ROWS: usize = 4;
+pub const ROWS: usize = 5;
+
+/// Noise by the pilot of light paths, if one ran and path tracing is a choice.
+fn pilot(light_paths: Result<counts::Choice, &'static str>) -> Option<PilotNoise> {
+    light_paths.ok().filter(|choice| choice.gain.is_some()).map(|choice| choice.noise)
+}
 
 impl Trial {
     /// Work for each pixel that reaches `goal` by path tracing, in rays.
@@ -28,6 +34,26 @@ impl Trial {
     /// Whether the pilot of light paths costs little beside the picture.
     pub fn affords_light_paths(&self, goal: &Goal) -> bool {
         self.budget(goal) * self.pixels > COUNTS_RAYS / COUNTS_SHARE
+    }
+
+    /// Whether the pilot of progressive photon mapping does: its samples have a light path for each pixel.
+    pub fn affords_photons(&self, goal: &Goal) -> bool {
+        self.budget(goal) > f64::from(SAMPLES) * RAYS_PER_SAMPLE / COUNTS_SHARE
+    }
+
+    /// Whether photons may be ahead of path tracing: it has some, or the pilot of `light_paths` finds light
+    /// that the trial misses.
+    pub fn may_need_photons(&self, goal: &Goal, light_paths: Result<counts::Choice, &'static str>) -> bool {
+        let work = self.budget(goal);
+        self.has_photons || self.error_of_rare_light(work, pilot(light_paths)) > self.error_of_paths(work)
+    }
+
+    /// relMSE of path tracing after so much work for each pixel by the pilot of light paths, which finds
+    /// light that the few paths of the trial miss.
+    fn error_of_rare_light(&self, work: f64, pilot: Option<PilotNoise>) -> f64 {
+        pilot.map_or(0.0, |noise| {
+            noise.rests[0].error(work / f64::from(noise.work_of_paths) / self.reuse, self.pixels)
+        })
     }
 
     /// relMSE of path tracing after so much work for each pixel.
@@ -64,31 +90,29 @@ impl Trial {
     }
 
     /// All candidates for `goal`. `without_caches` is a reason against caches; `light_paths` are the counts
-    /// of a pilot, or the reason for none.
+    /// of a pilot, `photons` the pilot of progressive photon mapping, or the reasons for none.
     pub fn table(
         &self,
         goal: &Goal,
         without_caches: Option<&'static str>,
         light_paths: Result<counts::Choice, &'static str>,
+        photons: Result<MethodPilot, &'static str>,
     ) -> Table<ROWS> {
-        use MethodKind::{Bidirectional, IrradianceCache, Path, RadianceCache, VertexMerging};
+        use MethodKind::{
+            Bidirectional, IrradianceCache, Path, ProgressivePhotons, RadianceCache, VertexMerging,
+        };
         if self.noise[0] <= 0.0 {
             let reason = "paths show no noise";
-            let others =
-                [IrradianceCache, RadianceCache, Bidirectional].map(|kind| Row::without(kind, reason));
-            let [first, second, third] = others;
-            return Table([Row { error: 0.0, ..Row::without(Path, reason) }, first, second, third]);
+            let kinds = [Path, IrradianceCache, RadianceCache, Bidirectional, ProgressivePhotons];
+            let mut rows = kinds.map(|kind| Row::without(kind, reason));
+            rows[0].error = 0.0;
+            return Table(rows);
         }
         let work = self.budget(goal);
-        let samples_of = |rays: f32| work / f64::from(rays);
-        let found = light_paths.ok().filter(|choice| choice.gain.is_some());
-        let pilot: Option<PilotNoise> = found.map(|choice| choice.noise);
+        let pilot = pilot(light_paths);
         let factor = if self.has_photons { PHOTONS_ERROR } else { 1.0 };
         let of_trial = self.error_of_paths(work);
-        // The pilot of light paths finds light that the few paths of the trial miss.
-        let of_pilot = pilot.map_or(0.0, |noise| {
-            noise.rests[0].error(samples_of(noise.work_of_paths) / self.reuse, self.pixels)
-        });
+        let of_pilot = self.error_of_rare_light(work, pilot);
         let paths = Row {
             error: (factor * of_trial).max(of_pilot),
             work: self.work[0],
@@ -117,23 +141,31 @@ impl Trial {
         };
         let merges = light_paths.is_ok_and(|choice| choice.counts.merging);
         let kind = if merges { VertexMerging } else { Bidirectional };
-        let light_paths = match (found, light_paths) {
-            (Some(choice), _) if choice.counts.light_paths > 0.0 => Row {
-                error: choice
-                    .noise
-                    .light_paths
-                    .error(samples_of(choice.noise.work) / LIGHT_PATHS_ERROR, self.pixels),
-                work: choice.noise.work.into(),
-                ..Row::without(kind, choice.light_paths)
-            },
+        let light_paths = match (pilot, light_paths) {
+            (Some(PilotNoise { light_paths: noise, work: rays, .. }), Ok(choice))
+                if choice.counts.light_paths > 0.0 =>
+            {
+                let samples = work / f64::from(rays);
+                let error = noise.error(samples / LIGHT_PATHS_ERROR, self.pixels);
+                Row { error, work: rays.into(), ..Row::without(kind, choice.light_paths) }
+            }
             (_, Ok(choice)) => Row::without(kind, choice.light_paths),
             (_, Err(reason)) => Row::without(kind, reason),
+        };
+        let photons = match photons {
+            Err(reason) => Row::without(ProgressivePhotons, reason),
+            Ok(pilot) => Row {
+                error: PROGRESSIVE_ERROR * pilot.error(work),
+                work: pilot.work,
+                ..Row::without(ProgressivePhotons, "noise and blur of its first samples")
+            },
         };
         Table([
             paths,
             cached(IRRADIANCE, without_caches),
             cached(RADIANCE, without_caches.or(without_lobes)),
             light_paths,
+            photons,
         ])
     }
 }

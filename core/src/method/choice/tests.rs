@@ -38,13 +38,23 @@ fn without(rest: f32) -> Choice {
 #[test]
 fn rare_light_is_that_of_records_or_stays_with_paths() {
     use MethodKind::{Bidirectional, IrradianceCache, Path};
-    let best = |found: Result<Choice, _>| TRIAL.table(&GOAL, None, found).best().kind;
+    let best = |found: Result<Choice, _>| TRIAL.table(&GOAL, None, found, Err("")).best().kind;
     assert_eq!(best(Err("")), IrradianceCache);
     assert_eq!(best(Ok(light_paths(0.05))), IrradianceCache, "records have the rare light");
     assert_eq!(best(Ok(light_paths(20.0))), Bidirectional, "caustics are left to paths");
     // The noise of path tracing is the same where light paths are no choice.
     assert_eq!(best(Ok(without(20.0))), Path);
     assert_eq!(best(Ok(without(0.05))), IrradianceCache);
+}
+
+#[test]
+fn photons_take_the_place_of_methods_with_more_predicted_error() {
+    let best = |noise: f64| {
+        let pilot = MethodPilot { noise, blur: 0.0, work: 6.0 };
+        TRIAL.table(&GOAL, None, Err(""), Ok(pilot)).best().kind
+    };
+    assert_eq!(best(1e-3), MethodKind::ProgressivePhotons);
+    assert_eq!(best(1.0), MethodKind::IrradianceCache);
 }
 
 #[test]

@@ -49,7 +49,7 @@ pub struct TrialCaches {
 
 /// Variance of the pixels of each of the `pictures` of a tile, relative to the light of pixels and blocks of
 /// the first one, and the number of pixels. Their `mean` radiance is that of the whole picture.
-fn variances<const N: usize>(pictures: [&[Pixel]; N], mean: f64) -> ([f64; N], f64) {
+pub(super) fn variances<const N: usize>(pictures: [&[Pixel]; N], mean: f64) -> ([f64; N], f64) {
     let brightness = |light: Rgb| f64::from(light.element_sum()) / 3.0;
     let (mut sums, mut count) = ([0.0; N], 0.0);
     for (number, block) in pictures[0].chunks(BLOCK).enumerate() {
@@ -70,8 +70,6 @@ fn variances<const N: usize>(pictures: [&[Pixel]; N], mean: f64) -> ([f64; N], f
     (sums, count)
 }
 
-/// Noise and work of samples of a picture: of all light, of that which no irradiance cache supplies, and of
-/// that which no record supplies.
 /// Noise and work of samples of a picture: of all light, of that which no irradiance cache supplies, and of
 /// that which no record supplies.
 #[derive(Clone, Copy, Debug, Default)]
@@ -95,7 +93,7 @@ pub struct Trial {
 }
 
 /// Working memory of a worker.
-pub fn scratch<F: Features>() -> Footprint {
+pub(super) fn scratch<F: Features>() -> Footprint {
     caustics::scratch::<F>().slice::<Pixel>(SUPPLIES * PIXELS_PER_TILE)
 }
 

@@ -1,5 +1,6 @@
 //! Choice of a method for a picture whose method is left open ([`crate::method::choice`]).
 
+use super::memory::Unbuilt;
 use super::{MethodKind, MethodPlan, MethodSetup};
 use crate::bsdf::Features;
 use crate::census::Census;
@@ -7,8 +8,13 @@ use crate::findings::Finding;
 use crate::memory::{MemorySource, OutOfMemory};
 use crate::method::bidirectional::BidirectionalSettings;
 use crate::method::caustics::CausticPathTracing;
-use crate::method::choice::{Trial, TrialCaches};
-use crate::method::{Executor, RenderMethod, counts};
+use crate::method::choice::{MethodPilot, Trial, TrialCaches};
+use crate::method::sppm::ProgressivePhotonMapping;
+use crate::method::{Executor, RenderMethod, caustics, counts};
+use crate::transport::PathSettings;
+
+/// Greatest fraction of the picture's time for the pilot of progressive photon mapping.
+const PILOT_TIME: f32 = 0.2;
 
 /// Outcome of a choice: the plan of another method than path tracing, and the table with the reason.
 pub(super) struct Chosen<'a, F> {
@@ -47,7 +53,8 @@ pub(super) fn choose<'a: 'm, 'm, F: Features>(
         true => Ok(choice.beside(&paths.findings())),
         false => Err("nothing would measure its bias"),
     });
-    let table = trial.table(goal, without_caches(setup), light_paths);
+    let photons = pilot_of_photons::<F>((&trial, light_paths), setup, memory, executor)?;
+    let table = trial.table(goal, without_caches(setup), light_paths, photons);
     let best = *table.best();
     let instead = match (best.kind, light_paths) {
         (MethodKind::Path, _) => None,
@@ -67,4 +74,34 @@ fn without_caches(setup: &MethodSetup) -> Option<&'static str> {
         true => None,
         false => Some("there is no indirect light of diffuse surfaces"),
     }
+}
+
+/// Pilot of progressive photon mapping, or the reason for none.
+fn pilot_of_photons<'a: 'm, 'm, F: Features>(
+    (trial, light_paths): (&Trial, Result<counts::Choice, &'static str>),
+    setup: &MethodSetup<'a, '_>,
+    memory: &mut impl MemorySource<'m>,
+    executor: &mut impl Executor,
+) -> Result<Result<MethodPilot, &'static str>, OutOfMemory> {
+    let MethodSetup { context, options, ref goal, .. } = *setup;
+    let PathSettings { width, height, .. } = context.settings;
+    let unbuilt = Unbuilt { scene: context.scene, size: [width, height], options: &options };
+    let reason = match trial.affords_photons(goal) {
+        _ if !setup.is_audited => "nothing would measure its bias",
+        _ if !caustics::are_possible(context.scene) => "nothing mirrors or refracts light narrowly",
+        _ if !trial.may_need_photons(goal, light_paths) => "caustics are little of the noise",
+        false => "its pilot takes too much of the work",
+        true if !memory.has(unbuilt.photon_pilot::<F>()) => "there is no memory for its pilot",
+        true => {
+            let build = |context: &_, memory: &mut _, executor: &mut _| {
+                ProgressivePhotonMapping::<F>::new(context, options.photons, 0, memory, executor)
+            };
+            let pilot = executor.within(PILOT_TIME, |executor| {
+                MethodPilot::run(&context, &mut memory.within(), executor, build)
+            });
+            let noisy = pilot?.filter(|pilot| pilot.noise > 0.0);
+            return Ok(noisy.ok_or("its pilot shows no noise, or had no time"));
+        }
+    };
+    Ok(Err(reason))
 }

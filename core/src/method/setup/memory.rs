@@ -15,7 +15,7 @@ use crate::method::photon_map::PhotonMapping;
 use crate::method::record_placement::CacheBuilder;
 use crate::method::sppm::ProgressivePhotonMapping;
 use crate::method::view_placement::Views;
-use crate::method::{caustics, counts, emission_guide, environment_visibility};
+use crate::method::{RenderState, caustics, counts, emission_guide, environment_visibility};
 use crate::scene::Scene;
 use crate::transport::photon_mapping::deposit::PhotonFilter;
 
@@ -81,7 +81,17 @@ impl Unbuilt<'_> {
         let counts = MethodOptions { bidirectional: counts, ..*self.options };
         let of = |kind| Unbuilt { options: &counts, ..*self }.footprint::<F>(kind, &cache(kind));
         let caches = of(MethodKind::IrradianceCache).or(of(MethodKind::RadianceCache));
-        of(MethodKind::Path).and(caches.or(of(MethodKind::Bidirectional)))
+        let light_paths = of(MethodKind::Bidirectional);
+        let photons =
+            if caustics::are_possible(self.scene) { self.photon_pilot::<F>() } else { Footprint::default() };
+        of(MethodKind::Path).and(caches.or(light_paths).or(photons))
+    }
+
+    /// Memory of the pilot of progressive photon mapping: a film beside the method.
+    pub(super) fn photon_pilot<F: Features>(&self) -> Footprint {
+        let photons = ProgressivePhotonMapping::<F>::footprint(self.pixels(), &self.options.photons);
+        let guide = emission_guide::footprint(self.lights(), self.size, PhotonFilter::Reflected);
+        photons.and(guide).and(RenderState::footprint(self.size[0], self.size[1]))
     }
 
     /// Memory of the visibility of the environment.
