@@ -9,8 +9,8 @@ use halflight_core::light::{EmissionSampler, luminance};
 use halflight_core::transport::SceneContext;
 use halflight_core::transport::metropolis::bootstrap::{Bootstrap, CANDIDATES, Lengths};
 use halflight_core::transport::metropolis::chain::{Chains, ChainsOutput, room};
-use halflight_core::transport::metropolis::split::{MAX_SEGMENTS, Split};
-use halflight_core::transport::metropolis::target::{PrimarySpace, Target};
+use halflight_core::transport::metropolis::split::{MAX_SEGMENTS, PrimarySpace, Split};
+use halflight_core::transport::metropolis::target::Target;
 
 /// Most chains, and most mutations of each.
 const CHAINS: usize = 40;
@@ -39,8 +39,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         };
         let threshold = [0.0, 0.5, 2.0, f32::INFINITY][usize::from(threshold % 4)];
         // Without levels all pixels have equal weight.
-        let split = Split { levels: &[], threshold, max_segments };
-        let target = Target::<All>::new(context, &emission, settings, split, space);
+        let split = Split { levels: &[], threshold, max_segments, space };
+        let target = Target::<All>::new(context, &emission, settings, split);
         let weights = input.arbitrary::<[u8; 4]>()?;
         let lengths = Lengths::new(target.lengths(), |segments| f64::from(weights[segments as usize % 4]));
         let bootstrap = Bootstrap::new(target, lengths, settings.seed, sample);

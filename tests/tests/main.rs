@@ -36,6 +36,7 @@ mod load_names;
 mod load_sides;
 mod load_support;
 mod lobe_rooms;
+mod mirrored_caustic;
 mod panes;
 mod photon_map;
 mod picture;

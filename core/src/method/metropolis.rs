@@ -27,7 +27,7 @@ mod pilot;
 mod plan;
 mod settings;
 
-pub use crate::transport::metropolis::target::PrimarySpace;
+pub use crate::transport::metropolis::split::PrimarySpace;
 pub use settings::{ChainUse, MetropolisSettings};
 
 use plan::{LONGEST, Plan};
@@ -46,7 +46,6 @@ struct Totals {
 pub struct Metropolis<'a, F> {
     context: RenderContext<'a>,
     emission: EmissionSampler<'a>,
-    space: PrimarySpace,
     split: Split<'a>,
     lengths: Lengths,
     plan: Plan,
@@ -110,8 +109,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
         let mut method = Self {
             context: *context,
             emission,
-            space: settings.space,
-            split: Split { levels: &[], threshold: 0.0, max_segments },
+            split: Split { levels: &[], threshold: 0.0, max_segments, space: settings.space },
             lengths: Lengths::new(3..=3, |_| 1.0),
             plan,
             densities: arena.slice(plan.candidates)?,
@@ -128,8 +126,8 @@ impl<'a, F: Features> Metropolis<'a, F> {
     }
 
     fn target(&self) -> Target<'_, F> {
-        let Self { context, emission, split, space, .. } = self;
-        Target::new(context.scene_context(), emission, context.settings, *split, *space)
+        let Self { context, emission, split, .. } = self;
+        Target::new(context.scene_context(), emission, context.settings, *split)
     }
 
     fn paths(&self) -> Paths<'_, F> {
@@ -170,12 +168,12 @@ impl<'a, F: Features> Metropolis<'a, F> {
             return Ok(Some(Counters::default()));
         }
         let Some(mut counters) = self.bootstrap(sample, executor)? else { return Ok(None) };
-        let Self { context, emission, split, space, lengths, plan, .. } = *self;
+        let Self { context, emission, split, lengths, plan, .. } = *self;
         let Self { densities, starts, splats, outputs, picture, .. } = self;
         let (densities, starts) = (&densities[..plan.candidates], &mut starts[..plan.chains]);
         let outputs = &mut outputs[..plan.tasks()];
         let (pixels, seed) = (picture.len(), context.settings.seed);
-        let target = Target::<F>::new(context.scene_context(), &emission, context.settings, split, space);
+        let target = Target::<F>::new(context.scene_context(), &emission, context.settings, split);
         let bootstrap = Bootstrap::new(target, lengths, seed, sample);
         let brightness = bootstrap.choose(densities, starts);
         self.totals.add(brightness);

@@ -14,7 +14,6 @@ use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::shading::{ShadedHit, Shading};
 use crate::transport::walk::subpath::{Subpath, Walk};
-use crate::transport::walk::sums::Counts;
 use crate::transport::walk::techniques::Weighted;
 use crate::transport::walk::vertex::Scatterer;
 use crate::transport::walk::visibility::ShadowRays;
@@ -57,7 +56,7 @@ pub(super) enum Part {
 /// Traces whole paths.
 #[derive(Clone, Copy)]
 pub struct Paths<'a, F> {
-    walk: Walk<'a, F>,
+    pub(super) walk: Walk<'a, F>,
     split: Split<'a>,
     max_depth: u32,
     seed: u32,
@@ -72,7 +71,8 @@ impl<'a, F: Features> Paths<'a, F> {
         split: Split<'a>,
     ) -> Self {
         let PathSettings { width, height, seed, max_depth } = settings;
-        let walk = Walk { context, emission, size: [width, height], counts: Counts::PATH_TRACING };
+        let counts = split.counts(width as f32 * height as f32);
+        let walk = Walk { context, emission, size: [width, height], counts };
         Self { walk, split, max_depth, seed }
     }
 
@@ -182,7 +182,8 @@ impl<'a, F: Features> Paths<'a, F> {
         // Roulette is no property of the path: the division does not know it.
         let alone = Weighted { radiance: light.radiance * path.survival, ..*light };
         let of_paths = self.split.of_paths(path.pixel, segments, &alone);
-        light.radiance * if part == Part::Paths { of_paths } else { 1.0 - of_paths }
+        // The light by path tracing alone, of which the weight among all techniques is a share.
+        light.radiance / light.by_paths * if part == Part::Paths { of_paths } else { 1.0 - of_paths }
     }
 
     /// One vertex of a path. The ray by which the path goes on.

@@ -8,7 +8,7 @@ use super::lane::Lane;
 use super::lanes::{LANES, Lanes};
 use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail, slots_of_technique};
 use super::paths::{Part, Path, Paths};
-use super::split::{MIN_SEGMENTS, Split};
+use super::split::{MIN_SEGMENTS, PrimarySpace, Split};
 use super::technique::{Technique, technique};
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -21,7 +21,6 @@ use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::shading::{ShadedHit, Shading, VertexNumbers};
 use crate::transport::walk::subpath::Walk;
-use crate::transport::walk::sums::Counts;
 use crate::transport::walk::techniques::{LensSample, Weighted};
 use crate::transport::walk::vertex::Scatterer;
 use bytemuck::{Pod, Zeroable};
@@ -42,16 +41,6 @@ pub(super) enum Step {
     Subpath,
 }
 
-/// Kinds of points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PrimarySpace {
-    /// One technique of a path of one length.
-    #[default]
-    Multiplexed,
-    /// All light of a path from the camera.
-    PathTracing,
-}
-
 /// The light of a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -68,7 +57,6 @@ pub struct Target<'a, F> {
     walk: Walk<'a, F>,
     paths: Paths<'a, F>,
     pub(super) split: Split<'a>,
-    pub(super) space: PrimarySpace,
 }
 
 impl<'a, F: Features> Target<'a, F> {
@@ -78,18 +66,14 @@ impl<'a, F: Features> Target<'a, F> {
         emission: &'a EmissionSampler<'a>,
         settings: PathSettings,
         split: Split<'a>,
-        space: PrimarySpace,
     ) -> Self {
-        let PathSettings { width, height, .. } = settings;
-        let light_paths = width as f32 * height as f32;
-        let counts = Counts { light_paths, connections: 1.0, light_samples: 1.0 };
-        let walk = Walk { context, emission, size: [width, height], counts };
-        Self { walk, paths: Paths::new(context, emission, settings, split), split, space }
+        let paths = Paths::new(context, emission, settings, split);
+        Self { walk: paths.walk, paths, split }
     }
 
     /// Numbers of a point for paths of a length.
     pub(super) fn slots(&self, segments: u32) -> usize {
-        match self.space {
+        match self.split.space {
             PrimarySpace::Multiplexed => slots_of_technique(segments),
             PrimarySpace::PathTracing => SLOTS_OF_PATH,
         }
@@ -109,7 +93,7 @@ impl<'a, F: Features> Target<'a, F> {
             Step::Large => mutation.renew(from, to, |_| true),
             Step::Subpath => {
                 let tail = self.tail(segments, from, mutation.choice());
-                match self.space {
+                match self.split.space {
                     PrimarySpace::Multiplexed => {
                         mutation.renew(from, to, |slot| tail.has_slot_of_technique(slot));
                     }
@@ -122,7 +106,7 @@ impl<'a, F: Features> Target<'a, F> {
     /// The tail of a subpath that numbers `u` choose. It depends on the technique alone.
     fn tail(&self, segments: u32, numbers: &[f32], [side, vertex]: [f32; 2]) -> Tail {
         let of = |from_light, vertices: u32| Tail { from_light, first: (vertex * vertices as f32) as u32 };
-        if self.space == PrimarySpace::PathTracing {
+        if self.split.space == PrimarySpace::PathTracing {
             return of(false, VERTICES_OF_TAILS);
         }
         match technique(segments, numbers) {
@@ -136,7 +120,7 @@ impl<'a, F: Features> Target<'a, F> {
 
     /// Numbers of segments that points are for.
     pub fn lengths(&self) -> core::ops::RangeInclusive<u32> {
-        match self.space {
+        match self.split.space {
             PrimarySpace::Multiplexed => MIN_SEGMENTS..=self.split.max_segments,
             PrimarySpace::PathTracing => MIN_SEGMENTS..=MIN_SEGMENTS,
         }
@@ -157,7 +141,7 @@ impl<'a, F: Features> Target<'a, F> {
         counters: &mut Counters,
     ) {
         values.fill(Value::default());
-        if self.space == PrimarySpace::PathTracing {
+        if self.split.space == PrimarySpace::PathTracing {
             return self.evaluate_paths(lanes, |lane| point(lane).0, values, counters);
         }
         let lane = |number| {

@@ -1,7 +1,7 @@
 //! Lengths, techniques and the division of light.
 
 use super::bootstrap::Lengths;
-use super::split::Split;
+use super::split::{PrimarySpace, Split};
 use crate::Rgb;
 use crate::transport::walk::techniques::Weighted;
 use std::vec::Vec;
@@ -21,16 +21,23 @@ fn lengths_are_chosen_by_their_weight_and_none_never() {
 }
 
 #[test]
-fn path_tracing_and_chains_share_all_light_and_paths_never_exceed_the_threshold() {
+fn path_tracing_and_chains_share_all_light_and_paths_keep_that_of_the_balance_heuristic() {
     let levels = [2.0];
-    let split = Split { levels: &levels, threshold: 8.0, max_segments: 20 };
+    let space = PrimarySpace::Multiplexed;
+    let split = Split { levels: &levels, threshold: 8.0, max_segments: 20, space };
     let with = |radiance: f32, by_paths: f32| Weighted { radiance: Rgb::splat(radiance), by_paths };
-    // The path tracer's own contribution is 20 / 0.5.
-    assert!((split.of_paths(63, 3, &with(20.0, 0.5)) - 0.4).abs() < 1e-6);
+    // The path tracer's own contribution is 20 / 0.25.
+    assert!((split.of_paths(63, 3, &with(20.0, 0.25)) - 0.25).abs() < 1e-6);
+    assert!((split.of_paths(63, 3, &with(8.0, 0.25)) - 0.5).abs() < 1e-6);
+    assert_eq!(split.of_paths(0, 3, &with(1e9, 0.5)), 0.5);
+    let of_paths = Split { space: PrimarySpace::PathTracing, ..split };
+    assert!((of_paths.of_paths(63, 3, &with(20.0, 0.5)) - 0.4).abs() < 1e-6);
+    // Nothing else finds it.
+    assert_eq!(split.of_paths(0, 3, &with(1e9, 1.0)), 1.0);
     assert_eq!(split.of_paths(0, 3, &with(1.0, 0.5)), 1.0);
     assert_eq!(split.of_paths(0, 3, &with(1.0, 0.0)), 0.0);
     let ends: Vec<f32> = [2, 21].map(|n| split.of_paths(0, n, &with(1e9, 0.5))).to_vec();
     assert_eq!(ends, [1.0, 1.0]);
     // Beyond the levels.
-    assert_eq!(split.of_paths(64, 3, &with(32.0, 1.0)), 0.25);
+    assert_eq!(split.of_paths(64, 3, &with(4.0, 0.25)), 0.5);
 }
