@@ -58,7 +58,7 @@ use library::{Library, Sources};
 use models::ReadModel;
 use mtl::MtlMaterial;
 use name::readings;
-use placed::{Placed, Placement};
+use placed::{Placed, PlacedMesh, Placement};
 use placed_light::PlacedLight;
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -149,15 +149,6 @@ struct SceneBuilder {
     cameras: Vec<NamedCamera>,
     lookup: Lookup,
     notes: Notes,
-}
-
-struct PlacedMesh {
-    name: String,
-    obj: usize,
-    placement: Placement,
-    /// Index into the materials of the scene for each material of the OBJ, and last for faces without
-    /// material.
-    materials: Rc<[u32]>,
 }
 
 impl SceneBuilder {

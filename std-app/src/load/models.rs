@@ -1,10 +1,10 @@
 //! glTF files in a scene under construction: read once, placed as often as the scene file says.
 
 use super::gltf;
-use super::placed::Placement;
+use super::placed::{PlacedMesh, Placement};
 use super::placed_light::PlacedLight;
 use super::scene::{NamedCamera, View};
-use super::{LoadError, MORE_MEMORY, PlacedMesh, SceneBuilder, obj, too_large};
+use super::{LoadError, MORE_MEMORY, SceneBuilder, obj, too_large};
 use crate::memory;
 use glam::DVec3;
 use std::path::Path;
@@ -12,8 +12,8 @@ use std::rc::Rc;
 
 /// A glTF file whose meshes and materials are in the scene.
 pub(super) struct ReadModel {
-    /// Index of the OBJ of each instance, and its placement in the file.
-    instances: Vec<(usize, Placement)>,
+    /// Name of each instance, index of its OBJ, and its placement in the file.
+    instances: Vec<(String, usize, Placement)>,
     materials: Rc<[u32]>,
     lights: Vec<PlacedLight>,
     cameras: Vec<NamedCamera>,
@@ -46,9 +46,9 @@ impl SceneBuilder {
             }
             None => model.materials.clone(),
         };
-        for (obj, own) in &model.instances {
-            let placement = placement.of(own);
-            self.meshes.push(PlacedMesh { obj: *obj, placement, materials: materials.clone() });
+        for (name, obj, own) in &model.instances {
+            let (name, placement) = (name.clone(), placement.of(own));
+            self.meshes.push(PlacedMesh { name, obj: *obj, placement, materials: materials.clone() });
         }
         self.lights.extend(model.lights.iter().map(|light| light.placed(&placement)));
         self.cameras.extend(model.cameras.iter().map(|camera| placed(camera, &placement)));
@@ -72,7 +72,11 @@ impl SceneBuilder {
             model.materials.into_iter().map(|material| self.new_material(material)).collect();
         materials.extend(materials.last().copied());
         Ok(ReadModel {
-            instances: model.instances.into_iter().map(|(mesh, own)| (first + mesh, own)).collect(),
+            instances: model
+                .instances
+                .into_iter()
+                .map(|(name, mesh, own)| (name, first + mesh, own))
+                .collect(),
             materials: materials.into(),
             lights: model.lights,
             cameras: model.cameras,

@@ -1,12 +1,10 @@
 //! A scene from arrays, with the repairs and notes of the loader.
 
 use super::obj::{Group, Obj};
-use super::placed::Placement;
+use super::placed::{PlacedMesh, Placement};
 use super::placed_light::PlacedLight;
 use super::scene_file::EnvironmentChange;
-use super::{
-    LoadError, LoadOptions, LoadedScene, PlacedMesh, SceneBuilder, View, memory_estimate, too_large,
-};
+use super::{LoadError, LoadOptions, LoadedScene, SceneBuilder, View, memory_estimate, too_large};
 use glam::Mat3;
 use halflight_core::Rgb;
 use halflight_core::scene::{Material, PointLight};

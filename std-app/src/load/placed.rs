@@ -4,9 +4,22 @@ use super::obj::Group;
 use super::texcoords::Texcoords;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::rc::Rc;
 
 /// Larger coordinates count as not finite, because their squares are infinite.
 const LARGEST: f64 = 1e150;
+
+/// A mesh of the scene.
+pub(super) struct PlacedMesh {
+    /// Name for messages and lightmaps.
+    pub(super) name: String,
+    /// Index of its OBJ.
+    pub(super) obj: usize,
+    pub(super) placement: Placement,
+    /// Index into the materials of the scene for each material of the OBJ, and last for faces without
+    /// material.
+    pub(super) materials: Rc<[u32]>,
+}
 
 /// Position and orientation of a mesh: `linear * p + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]

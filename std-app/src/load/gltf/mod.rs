@@ -33,8 +33,8 @@ pub struct Model {
     pub meshes: Vec<Vec<Group>>,
     /// Materials of the groups.
     pub materials: Vec<MtlMaterial>,
-    /// Index of a mesh, and its placement, in the order of the nodes.
-    pub(super) instances: Vec<(usize, Placement)>,
+    /// Name of each node with a mesh, index of the mesh, and its placement.
+    pub(super) instances: Vec<(String, usize, Placement)>,
     /// Punctual lights.
     pub(super) lights: Vec<PlacedLight>,
     /// Perspective cameras.

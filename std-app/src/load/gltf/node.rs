@@ -154,7 +154,7 @@ impl Builder<'_> {
         source.take(PART * (1 + self.model.meshes[index].len()))?;
         // Joints place a mesh in the world.
         let placement = if skin.is_some() { Placement::IDENTITY } else { placement };
-        self.model.instances.push((index, placement));
+        self.model.instances.push((node.name.clone(), index, placement));
         Ok(())
     }
 
