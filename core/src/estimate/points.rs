@@ -4,8 +4,9 @@
 //! Most points have not met rare light, and their own samples do not show its variance; those of near points
 //! do. For a block of points with the half-means A and B and the four quarter-means q:
 //!
-//! 1. m = (A + B) / 2. The mean of (A − B)² / 4 over the block is s, the variance of m. The variance of the
-//!    quarters v = Σ (q − m)² / 12 has its shape.
+//! 1. m = (A + B) / 2. The mean of (A − B)² / 4 over the block is s, the variance of m. The density bias of
+//!    photons adds its square, the product of its estimates by the halves. The variance of the quarters
+//!    v = Σ (q − m)² / 12 has its shape.
 //! 2. k, the mean of m over the nearest other points. The expected v of a point rises with k: β is the slope
 //!    of v over m, and τ = max(v̄ + β (k − m̄), v̄ / 10) / v̄. The m of a point is correlated with its own v,
 //!    that of its neighbours is not.
@@ -41,7 +42,7 @@ pub(super) type Place = (Vec3, Vec3);
 struct Sums {
     /// Mean of both halves.
     mean: f32,
-    /// Squared difference of the halves, quartered.
+    /// Squared difference of the halves, quartered, and the square of the density bias by both.
     halves: f32,
     /// Variance of the mean by its quarters.
     quarters: f32,
@@ -55,7 +56,8 @@ impl Sums {
         let mean = 0.5 * (halves[0] + halves[1]);
         let square = |x: f32| x * x;
         let spread: f32 = quarters.iter().map(|q| square(q - mean)).sum();
-        Some(Self { mean, halves: 0.25 * square(halves[0] - halves[1]), quarters: spread / 12.0 })
+        let bias = pixel.even.blur() * pixel.odd.blur();
+        Some(Self { mean, halves: 0.25 * square(halves[0] - halves[1]) + bias, quarters: spread / 12.0 })
     }
 }
 
@@ -75,7 +77,8 @@ pub fn point_variances(pixels: &[Pixel], place: impl Fn(usize) -> Place, varianc
         return;
     }
     let mean_of = |value: fn(&Sums) -> f32| known().map(value).sum::<f32>() / number as f32;
-    let (mean, pooled, quarters) = (mean_of(|p| p.mean), mean_of(|p| p.halves), mean_of(|p| p.quarters));
+    let (mean, pooled) = (mean_of(|p| p.mean), mean_of(|p| p.halves).max(0.0));
+    let quarters = mean_of(|p| p.quarters);
     let slope = {
         let square: f32 = known().map(|p| (p.mean - mean) * (p.mean - mean)).sum();
         let product: f32 = known().map(|p| (p.mean - mean) * (p.quarters - quarters)).sum();

@@ -58,7 +58,7 @@ use crate::Level;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
 use crate::findings::Findings;
-use crate::light::{EmissionSampler, LightSampler};
+use crate::light::{EmissionSampler, Focus, LightSampler};
 use crate::memory::{Arena, OutOfMemory};
 use crate::photon::PhotonMap;
 use crate::scene::{PointLight, Scene};
@@ -106,6 +106,15 @@ impl<'a> RenderContext<'a> {
         let size = [self.settings.width, self.settings.height];
         // Other lights need no focus: their photons start at surfaces.
         let focus = has_distant.then(|| visible_focus((self.scene, &self.bvh), size, self.level)).flatten();
+        self.emission_around(focus, arena)
+    }
+
+    /// The same with this focus of the light from infinity.
+    pub(crate) fn emission_around<'m>(
+        &self,
+        focus: Option<Focus>,
+        arena: &mut Arena<'m>,
+    ) -> Result<EmissionSampler<'m>, OutOfMemory> {
         EmissionSampler::build_around(self.scene, &self.lights, (&self.bvh.bounds(), focus), arena)
     }
 

@@ -114,6 +114,11 @@ impl<'a, F: Features> PathTracing<'a, F> {
         Ok(mean)
     }
 
+    /// Size of its pilots.
+    pub fn pilots(&self) -> PilotSize {
+        self.pilots
+    }
+
     /// Variance and work of the samples of a picture of about `mean` radiance.
     ///
     /// # Errors

@@ -101,7 +101,14 @@ impl<E: Executor> Round<'_, '_, E> {
     /// Number of the next sample of the least sampled pixel; `None` at the end of the round. For methods that
     /// build something anew before a sample.
     pub fn next_sample(&self) -> Option<u32> {
-        let spp = self.state.spp();
+        self.next_open_sample(|_| true)
+    }
+
+    /// As [`Round::next_sample`], of the tiles that are open.
+    pub fn next_open_sample(&self, is_open: impl Fn(usize) -> bool) -> Option<u32> {
+        let RenderState { samples, shard, .. } = &*self.state;
+        let open = samples.iter().enumerate().filter(|(tile, _)| shard.owns(*tile) && is_open(*tile));
+        let spp = open.map(|(_, samples)| *samples).min()?;
         (spp < self.target && !self.executor.is_over()).then_some(spp)
     }
 

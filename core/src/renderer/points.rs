@@ -11,8 +11,9 @@ use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::bvh::Bvh;
 use crate::estimate::{POOLED_POINTS, half_width, point_variances};
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE};
+use crate::findings::Findings;
 use crate::light::{LightSampler, luminance};
-use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::memory::{Arena, Buffer, Footprint, OutOfMemory};
 use crate::method::{Executor, IrradiancePoints, PilotSize, RenderContext, RenderState, Round};
 use crate::reconstruction::for_pieces;
 use crate::scene::Scene;
@@ -70,7 +71,7 @@ impl<'a> IrradianceRenderer<'a> {
     pub fn required_memory(scene: &Scene, points: usize) -> RequiredMemory {
         let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let structures =
-            Bvh::footprint(scene.mesh.triangles.len()).and(lights).and(Layout::of(points).footprint());
+            Bvh::footprint(scene.mesh.triangles.len()).and(lights).and(Self::footprint(scene, points));
         RequiredMemory { structures: structures.bytes(), scratch: Self::scratch().bytes() }
     }
 
@@ -104,10 +105,11 @@ impl<'a> IrradianceRenderer<'a> {
         IrradiancePoints::<All>::scratch()
     }
 
-    /// Memory of the points alone, beside structures of the scene that exist.
+    /// Memory of the points and their photons alone, beside structures of the scene that exist.
     #[doc(hidden)]
-    pub fn footprint(points: usize) -> Footprint {
-        Layout::of(points).footprint()
+    pub fn footprint(scene: &Scene, points: usize) -> Footprint {
+        let layout = Layout::of(points);
+        layout.footprint().and(IrradiancePoints::<All>::footprint(scene, layout.pixels()))
     }
 
     /// As [`IrradianceRenderer::new`], over structures of the scene that exist.
@@ -157,7 +159,10 @@ impl<'a> IrradianceRenderer<'a> {
         })?;
         // Without positions nothing can be sampled: the film stays empty.
         let points = if passed.is_complete { &*ordered } else { &[] };
-        let build = build_for!(scene, IrradiancePoints::new(&context, points, settings.light));
+        let photons = IrradiancePoints::<All>::footprint(scene, pixels).bytes();
+        let memory = &mut Buffer::new(arena.slice(photons.min(arena.available()))?);
+        let wanted = (points, settings.light, settings.caustics);
+        let build = build_for!(scene, IrradiancePoints::new(&context, wanted, memory, executor)?);
         let (decision, error) = (FIRST_DECISION, 0.0);
         Ok(Self { build, points, layout, places, state, half_widths, finished, decision, error })
     }
@@ -214,6 +219,11 @@ impl<'a> IrradianceRenderer<'a> {
     /// Sums of the samples. Pixels are points along a Z-curve.
     pub fn state(&self) -> &RenderState<'a> {
         &self.state
+    }
+
+    /// Decisions and numbers of caustic photons.
+    pub fn findings(&self) -> Findings {
+        of_build!(&self.build, method => method.findings())
     }
 
     /// Rays and rejected samples so far.

@@ -6,7 +6,7 @@ mod probes;
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::outputs::{Outputs, Role};
-use super::picture_args::{note_darkness, render_failure};
+use super::picture_args::{Caustics, note_darkness, render_failure};
 use super::progress::ProgressReporter;
 use super::{print_note, values};
 use clap::{Args, ValueEnum};
@@ -17,7 +17,7 @@ use halflight::load::{self, LoadOptions, LoadedScene};
 use halflight::memory::Budget;
 use halflight::quantity::readable_seconds;
 use halflight::render::Stop;
-use halflight::report::file_name;
+use halflight::report::{file_name, findings};
 use halflight::values::{Depth, Samples, TargetError};
 use halflight_core::{IrradiancePoint, LightPart};
 use serde_json::{Value, json};
@@ -54,6 +54,10 @@ pub(super) struct Bake {
     /// Light to estimate
     #[arg(long, default_value = "all")]
     light: Light,
+
+    /// Caustic photons, which find light through glass and by mirrors
+    #[arg(long, default_value = "auto")]
+    caustics: Caustics,
 
     /// Samples per point
     #[arg(long, value_name = "N", value_parser = values::checked::<u32, Samples>)]
@@ -182,6 +186,7 @@ impl Bake {
                 Light::Direct => LightPart::Direct,
                 Light::Indirect => LightPart::Indirect,
             },
+            caustics: self.caustics == Caustics::Auto,
             seed: self.seed,
             max_depth: self.max_depth.map(u32::from),
             threads: self.threads(),
@@ -242,6 +247,7 @@ impl Bake {
             "half_width": baked.median_half_width(),
             "mean": baked.mean(),
             "seconds": { "build": build, "sampling": sampling },
+            "findings": findings_object(&baked.findings),
             "rays": baked.counters.all_rays(),
             "paths": baked.counters.paths,
             "dropped": baked.counters.dropped.total(),

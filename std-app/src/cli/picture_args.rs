@@ -256,8 +256,8 @@ enum Kernel {
     Epanechnikov,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Caustics {
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub(super) enum Caustics {
     /// If a pilot finds that they reduce variance
     Auto,
     /// Never

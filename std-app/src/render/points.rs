@@ -7,6 +7,7 @@ use super::memory::{Bank, Memory};
 use super::threads::{Pool, Threads, Workers};
 use super::{RenderError, Stop};
 use core::sync::atomic::AtomicBool;
+use halflight_core::findings::Findings;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Counters, SceneContext};
@@ -29,6 +30,8 @@ pub struct BakeSettings {
     pub stop: Stop,
     /// Light to estimate.
     pub light: LightPart,
+    /// Caustic photons where a pilot finds that they pay.
+    pub caustics: bool,
     /// Seed of all random numbers.
     pub seed: u32,
     /// Most segments of a path; 2 is direct light. `None`: no limit.
@@ -53,6 +56,7 @@ impl Default for BakeSettings {
         Self {
             stop: Self::SENSIBLE,
             light: LightPart::All,
+            caustics: true,
             seed: 0,
             max_depth: None,
             threads: None,
@@ -86,6 +90,8 @@ pub struct Baked {
     pub back_faces: Vec<f32>,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],
+    /// Decisions and numbers of caustic photons.
+    pub findings: Findings,
     /// Rays and rejected samples.
     pub counters: Counters,
     /// Seconds of building and of sampling.
@@ -126,7 +132,7 @@ pub(crate) fn with_points(
     built.count_in(&mut memory)?;
     let given = Footprint::default().slice::<IrradiancePoint>(points.len()).slice::<f32>(points.len());
     memory.set_aside("given points", given)?;
-    let mut lines = memory.take("points", IrradianceRenderer::footprint(points.len()))?;
+    let mut lines = memory.take("points", IrradianceRenderer::footprint(scene, points.len()))?;
     let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(settings.stop.seconds));
     let deadline = workers.deadline.after(1.0);
     let mut scratch = memory.take_each("working memory", IrradianceRenderer::scratch(), workers.count())?;
@@ -141,6 +147,7 @@ pub(crate) fn with_points(
         max_depth: settings.max_depth,
         level: settings.level,
         light: settings.light,
+        caustics: settings.caustics,
         ..PointSettings::default()
     };
     let lights = built.lights.with_level(settings.level);
@@ -180,6 +187,7 @@ pub(crate) fn with_points(
         values: renderer.values().collect(),
         back_faces: shares,
         tiles: renderer.tiles(),
+        findings: renderer.findings(),
         counters: renderer.counters(),
         seconds: [built.seconds(), start.elapsed().as_secs_f64()],
         is_interrupted: workers.deadline.is_interrupted(),

@@ -7,12 +7,15 @@
 mod benefit;
 mod emission;
 mod photons;
+mod points;
 mod prepass;
+mod receivers;
 #[cfg(test)]
 mod tests;
 
 pub use emission::{CausticEmission, CausticSettings, least_footprint};
 pub use photons::{CausticPhotons, RecordPhotons};
+pub use points::PointReceivers;
 pub use prepass::{Decision, Prepass, prepass, unseen, unseen_footprint};
 
 use super::path::{PathTracing, Reuse};
@@ -26,6 +29,7 @@ use crate::scene::Scene;
 use crate::transport::caustics::tracer::CausticPhotonTracer;
 use crate::transport::path::WAVE;
 use crate::transport::{CausticMerging, PathIntegrator, PathReuse};
+use receivers::Receivers;
 
 /// Working memory of a worker: that of paths or of light paths.
 pub fn scratch<F: Features>() -> Footprint {
@@ -79,6 +83,27 @@ impl CausticUse {
     }
 }
 
+/// Photons for `receivers` where a prepass and their first maps find that they pay.
+///
+/// # Errors
+/// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`].
+pub fn photons_that_pay<'a, F: Features>(
+    context: &RenderContext<'a>,
+    receivers: &mut impl Receivers<'a, F>,
+    settings: CausticSettings,
+    memory: &mut impl MemorySource<'a>,
+    executor: &mut impl Executor,
+) -> Result<(Option<CausticPhotons<'a>>, CausticUse), OutOfMemory> {
+    let Prepass { decision, share, lacks_memory } = prepass(context, receivers, settings, memory, executor)?;
+    let without = CausticUse { used: false, share, lacks_memory };
+    let Decision::Photons(emission) = decision else { return Ok((None, without)) };
+    let Some(mut photons) = CausticPhotons::new(context, emission, settings, memory)? else {
+        return Ok((None, CausticUse { lacks_memory: true, ..without }));
+    };
+    let used = photons.pays(receivers, executor)?;
+    Ok((used.then_some(photons), CausticUse { used, ..without }))
+}
+
 /// Path tracing of one picture, with caustic photons where they pay.
 pub struct CausticPathTracing<'a, F> {
     paths: PathTracing<'a, F>,
@@ -98,22 +123,8 @@ impl<'a, F: Features> CausticPathTracing<'a, F> {
         memory: &mut impl MemorySource<'a>,
         executor: &mut impl Executor,
     ) -> Result<Self, OutOfMemory> {
-        let Prepass { decision, share, lacks_memory } =
-            prepass(context, &mut paths, settings, memory, executor)?;
-        let mut method =
-            Self { paths, photons: None, finding: CausticUse { used: false, share, lacks_memory } };
-        let emission = match decision {
-            Decision::Paths => return Ok(method),
-            Decision::Photons(emission) => emission,
-        };
-        match CausticPhotons::new(context, emission, settings, memory)? {
-            None => method.finding.lacks_memory = true,
-            Some(mut photons) => {
-                method.finding.used = photons.pays(&method.paths, executor)?;
-                method.photons = method.finding.used.then_some(photons);
-            }
-        }
-        Ok(method)
+        let (photons, finding) = photons_that_pay(context, &mut paths, settings, memory, executor)?;
+        Ok(Self { paths, photons, finding })
     }
 
     /// `paths` alone, after the `finding` of a prepass.

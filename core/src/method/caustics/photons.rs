@@ -5,12 +5,12 @@
 
 use super::benefit::PATHS_PER_SAMPLE;
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
+use super::receivers::Receivers;
 use crate::bsdf::Features;
 use crate::light::EmissionSampler;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::method::executor::{Executor, Passed};
-use crate::method::path::PathTracing;
-use crate::method::{MapUse, PhotonMapPair, PhotonMapStore, PhotonUse, RenderContext, Round, pilot};
+use crate::method::{MapUse, PhotonMapPair, PhotonMapStore, PhotonUse, RenderContext, Round};
 use crate::photon::PhotonMap;
 use crate::transport::caustics::tracer::{PATHS_PER_TASK, PHOTONS_PER_TASK};
 use crate::transport::{CausticMerging, LightEstimator, PathIntegrator, RadiusSchedule, Sharing, path::WAVE};
@@ -162,28 +162,24 @@ impl<'a> CausticPhotons<'a> {
         self.statistics
     }
 
-    /// True if the photons of the first samples leave less variance for the work than `paths` alone. They are
-    /// then the photons of the first samples of the picture.
+    /// True if the photons of the first samples leave less variance for the work than paths alone. They are
+    /// then the photons of the first samples of `receivers`.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).
     pub fn pays<F: Features>(
         &mut self,
-        paths: &PathTracing<F>,
+        receivers: &impl Receivers<'a, F>,
         executor: &mut impl Executor,
     ) -> Result<bool, OutOfMemory> {
         let Passed { counters, is_complete } = self.make::<F>(Block::of(0), executor)?;
         if !is_complete {
             return Ok(false);
         }
-        let (benefit, has_reuse) = (self.emission.benefit, paths.reuse().used);
-        let measured = (benefit.mean as f32, self.context.pilots);
-        let alone = benefit.path_tracing(&paths.variance(measured.0, executor)?, has_reuse);
-        let integrator = paths.integrator();
-        let joined = self.lend(|photons| match photons {
-            Some(photons) => pilot::variance(&integrator.with_caustics(photons), measured, executor),
-            None => pilot::variance(integrator, measured, executor),
-        })??;
+        let (benefit, has_reuse) = (self.emission.benefit, receivers.has_reuse());
+        let mean = benefit.mean as f32;
+        let alone = benefit.path_tracing(&receivers.variance(None, mean, executor)?, has_reuse);
+        let joined = self.lend(|photons| receivers.variance(photons, mean, executor))??;
         let light_rays = counters.rays as f64 / (2.0 * self.context.pixels() as f64);
         Ok(alone.exceeds(&joined, has_reuse, light_rays))
     }
@@ -197,7 +193,30 @@ impl<'a> CausticPhotons<'a> {
         integrator: &PathIntegrator<F, E, R>,
         round: &mut Round<impl Executor>,
     ) -> Result<(), OutOfMemory> {
-        while let Some(sample) = round.next_sample() {
+        self.blocks::<F, _>(
+            round,
+            |round| round.next_sample(),
+            |round, photons, end| {
+                let integrator = integrator.with_caustics(photons);
+                round.tiles(end, |tile, samples, scratch, pixels| {
+                    integrator.run(tile, samples, WAVE, scratch, pixels)
+                })
+            },
+        )
+    }
+
+    /// Calls `add` with the photons of each block of samples of `round` and the end of the block, from the
+    /// sample on that is `next`.
+    ///
+    /// # Errors
+    /// Those of [`CausticPhotons::round`] and of `add`.
+    pub fn blocks<F: Features, X: Executor>(
+        &mut self,
+        round: &mut Round<X>,
+        next: impl Fn(&Round<X>) -> Option<u32>,
+        add: impl Fn(&mut Round<X>, CausticMerging, u32) -> Result<(), OutOfMemory>,
+    ) -> Result<(), OutOfMemory> {
+        while let Some(sample) = next(round) {
             let block = Block::of(sample);
             if self.made.is_none_or(|made| made.block != block) {
                 let passed = self.make::<F>(block, round.executor)?;
@@ -205,13 +224,7 @@ impl<'a> CausticPhotons<'a> {
                     return Ok(());
                 }
             }
-            self.lend(|photons| {
-                let Some(photons) = photons else { return Ok(()) };
-                let integrator = integrator.with_caustics(photons);
-                round.tiles(block.end, |tile, samples, scratch, pixels| {
-                    integrator.run(tile, samples, WAVE, scratch, pixels)
-                })
-            })??;
+            self.lend(|photons| photons.map_or(Ok(()), |photons| add(round, photons, block.end)))??;
         }
         Ok(())
     }

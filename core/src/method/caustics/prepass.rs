@@ -3,14 +3,15 @@
 
 use super::benefit::{Benefit, missing};
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
+use super::receivers::Receivers;
 use crate::bsdf::Features;
 use crate::light::{EmissionSampler, GuideStats};
 use crate::memory::{Arena, Footprint, Line, MemorySource, OutOfMemory};
-use crate::method::path::PathTracing;
 use crate::method::{Executor, RenderContext, pilot};
-use crate::photon::Photons;
+use crate::photon::{PhotonMap, Photons};
 use crate::transport::caustics::tracer::{GuideSample, PATHS_PER_TASK};
-use crate::transport::{CausticMerging, RadiusSchedule, SuppliedLobes};
+use crate::transport::{CausticMerging, RadiusSchedule};
+use core::marker::PhantomData;
 
 /// Light paths of the first test, which ends the prepass where there is next to nothing to find, and of each
 /// later step; where memory is short, fewer, but no fewer than those of the test.
@@ -79,13 +80,13 @@ fn step(context: &RenderContext, available: usize) -> usize {
     (left / task.bytes() * PATHS_PER_TASK).clamp(FIRST_TEST, wanted.max(FIRST_TEST))
 }
 
-/// Runs a prepass for a picture of `context`; `paths` measure it without photons.
+/// Runs a prepass for `receivers` in the scene of `context`.
 ///
 /// # Errors
 /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).
 pub fn prepass<'a, F: Features>(
     context: &RenderContext<'a>,
-    paths: &mut PathTracing<F>,
+    receivers: &mut impl Receivers<'a, F>,
     settings: CausticSettings,
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
@@ -100,20 +101,21 @@ pub fn prepass<'a, F: Features>(
     memory.lend(EMISSION, lent, |memory, arena| {
         let light_paths = LightPaths {
             context,
-            radii: context.radii().after(FIRST_RADIUS, 0),
+            radii: receivers.radii(context).after(FIRST_RADIUS, 0),
             beside_records: settings.beside_records,
             found: arena.slice(step)?,
             executor,
         };
-        let by_power = context.emission(arena)?;
-        let mut learning = Learning { light_paths, paths, share: None };
+        let by_power = receivers.emission(context, arena)?;
+        let mut learning = Learning { light_paths, receivers, share: None, features: PhantomData };
         let decision = match learning.run(&by_power, arena)? {
             Learned::Paths => Decision::Paths,
             Learned::Photons(stats, benefit) => {
                 let mut arena = memory.take(EMISSION, kept)?;
-                let by_power = context.emission(&mut arena)?;
+                let by_power = learning.receivers.emission(context, &mut arena)?;
                 let sampler = stats.guide(&by_power, &mut arena)?;
-                Decision::Photons(CausticEmission { sampler, radii: context.radii(), benefit })
+                let radii = learning.receivers.radii(context);
+                Decision::Photons(CausticEmission { sampler, radii, benefit })
             }
         };
         Ok(Prepass { decision, share: learning.share, lacks_memory: false })
@@ -127,13 +129,14 @@ enum Learned<'l> {
 }
 
 /// A prepass at work.
-struct Learning<'p, 'a, F, E> {
-    light_paths: LightPaths<'p, E>,
-    paths: &'p mut PathTracing<'a, F>,
+struct Learning<'p, 'a, F, R, E> {
+    light_paths: LightPaths<'p, 'a, E>,
+    receivers: &'p mut R,
     share: Option<f64>,
+    features: PhantomData<F>,
 }
 
-impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
+impl<'a, F: Features, R: Receivers<'a, F>, E: Executor> Learning<'_, 'a, F, R, E> {
     fn run<'l>(
         &mut self,
         by_power: &EmissionSampler<'l>,
@@ -144,20 +147,24 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
             return Ok(Learned::Paths);
         };
         let aimed = stats.guide(by_power, &mut arena.scratch())?;
-        self.light_paths.trace::<F>(&aimed, FIRST_TEST, AIMED_MAP)?;
-        let mean = self.paths.mean_radiance(self.light_paths.executor)?;
+        self.trace(&aimed, FIRST_TEST, AIMED_MAP)?;
+        let mean = self.receivers.mean(self.light_paths.executor)?;
         if !self.benefit(FIRST_TEST, mean).may_pay() {
             return Ok(Learned::Paths);
         }
         let step = self.light_paths.found.len();
-        self.light_paths.trace::<F>(&aimed, step, AIMED_MAP)?;
+        self.trace(&aimed, step, AIMED_MAP)?;
         self.light_paths.teach(&mut stats);
         let learned = stats.guide(by_power, &mut arena.scratch())?;
-        self.light_paths.trace::<F>(&learned, step, LEARNED_MAP)?;
+        self.trace(&learned, step, LEARNED_MAP)?;
         self.light_paths.teach(&mut stats);
         let mean = self.other_light(&learned)?;
         let benefit = self.benefit(step, mean);
         Ok(if self.pays(&benefit)? { Learned::Photons(stats, benefit) } else { Learned::Paths })
+    }
+
+    fn trace(&mut self, sampler: &EmissionSampler, count: usize, map: u32) -> Result<(), OutOfMemory> {
+        self.light_paths.trace::<F>((sampler, self.receivers.points()), count, map)
     }
 
     /// The benefit by the first `count` light paths, in a picture in which all other light has a `mean`
@@ -165,7 +172,8 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
     fn benefit(&mut self, count: usize, mean: f32) -> Benefit {
         let LightPaths { context, found, .. } = &mut self.light_paths;
         let found = found.get_mut(..count).unwrap_or_default();
-        let benefit = Benefit::new(found, FIRST_RADIUS, context.pixels() as f64, f64::from(mean));
+        let radius = self.receivers.first_radius();
+        let benefit = Benefit::new(found, radius, context.pixels() as f64, f64::from(mean));
         self.share = Some(benefit.share);
         benefit
     }
@@ -174,13 +182,12 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
     /// visible lamp, or a path that meets one through glass, may be nearly all of that, or be absent by
     /// chance.
     fn other_light(&mut self, sampler: &EmissionSampler) -> Result<f32, OutOfMemory> {
-        let LightPaths { context, radii, beside_records, ref found, ref mut executor } = self.light_paths;
+        let LightPaths { radii, beside_records, ref found, ref mut executor, .. } = self.light_paths;
         // Weights alone: an empty map adds no light.
         let mut line = [Line([0; _])];
         let empty = Photons::new(0, &mut Arena::over(&mut line))?.build(0);
         let merging = CausticMerging::new([&empty; 2], sampler, radii, found.len() as u32);
-        let integrator = self.paths.integrator().with_caustics(merging.beside_records(beside_records));
-        pilot::mean_radiance_without_photons(&integrator, context.pilots, *executor)
+        self.receivers.mean_beside(merging.beside_records(beside_records), *executor)
     }
 
     /// True if photons may pay. Records supply indirect light without its noise.
@@ -188,39 +195,32 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         if benefit.pays() {
             return Ok(true);
         }
-        let LightPaths { context, beside_records, ref mut executor, .. } = self.light_paths;
-        let mean = benefit.mean as f32;
-        let noise = match beside_records {
-            false => self.paths.variance(mean, *executor)?.noise(self.paths.reuse().used),
-            true => {
-                let paths = self.paths.integrator().without_cached_light(SuppliedLobes::default());
-                pilot::variance(&paths, (mean, context.pilots), *executor)?.noise(false)
-            }
-        };
+        let LightPaths { beside_records, ref mut executor, .. } = self.light_paths;
+        let noise = self.receivers.noise((benefit.mean as f32, beside_records), *executor)?;
         Ok(benefit.pays_beside(noise))
     }
 }
 
 /// Light paths of the prepass, and what they found.
-struct LightPaths<'p, E> {
-    context: &'p RenderContext<'p>,
+struct LightPaths<'p, 'a, E> {
+    context: &'p RenderContext<'a>,
     radii: RadiusSchedule,
     beside_records: bool,
     found: &'p mut [GuideSample],
     executor: &'p mut E,
 }
 
-impl<E: Executor> LightPaths<'_, E> {
-    /// Replaces what was found by `count` light paths of `sampler`, those of a `map`. If the executor ends
-    /// early, the paths that are missing found nothing.
+impl<E: Executor> LightPaths<'_, '_, E> {
+    /// Replaces what was found by `count` light paths of `sampler`, those of a `map`, near `points` or by the
+    /// camera. If the executor ends early, the paths that are missing found nothing.
     fn trace<F: Features>(
         &mut self,
-        sampler: &EmissionSampler,
+        (sampler, points): (&EmissionSampler, Option<&PhotonMap>),
         count: usize,
         map: u32,
     ) -> Result<(), OutOfMemory> {
         let Self { context, radii, beside_records, found, executor } = self;
-        let tracer = photon_tracer::<F>(context, sampler, count, *radii, *beside_records);
+        let tracer = photon_tracer::<F>(context, sampler, count, *radii, *beside_records).near(points);
         found.fill(GuideSample::default());
         let pieces = found.get_mut(..count).unwrap_or_default().chunks_mut(PATHS_PER_TASK);
         let _ = executor
@@ -260,7 +260,7 @@ pub fn unseen<'m, F: Features>(
         let by_power = context.emission(arena)?;
         let radii = context.radii().after(FIRST_RADIUS, 0);
         let mut light_paths = LightPaths { context, radii, beside_records: false, found, executor };
-        light_paths.trace::<F>(&by_power, STEP, AUDIT_MAP)?;
+        light_paths.trace::<F>((&by_power, None), STEP, AUDIT_MAP)?;
         let LightPaths { found, executor, .. } = light_paths;
         let missing = missing(found, FIRST_RADIUS, context.pixels() as f64, (samples, FEWEST_HITS));
         let mean = f64::from(pilot::mean_radiance(&context.integrator::<F>(), context.pilots, executor)?);

@@ -2,15 +2,18 @@
 //! the room is path traced alone.
 
 use super::{CausticPathTracing, CausticSettings, CausticUse, scratch, unseen, unseen_footprint};
-use crate::Rgb;
 use crate::bsdf::All;
 use crate::film::Pixel;
+use crate::findings::Decision::{Limited, Used};
 use crate::light::LightSampler;
 use crate::memory::{Arena, Buffer, Footprint, OutOfMemory};
 use crate::method::path::PathTracing;
 use crate::method::tests::{PLENTY, film, lines, with_room};
 use crate::method::{Loop, PhotonUse, RenderContext, RenderMethod};
+use crate::renderer::{IrradianceRenderer, PointSettings, Until};
 use crate::scene::{Material, PointLight, Scene};
+use crate::transport::IrradiancePoint;
+use crate::{Level, Rgb};
 use glam::Vec3;
 use std::vec::Vec;
 
@@ -88,6 +91,53 @@ fn little_memory_makes_few_photons_and_none_paths_alone() {
         }
         assert!(lacking >= 3 && few >= 1, "{lacking} {few}");
         assert!(picture(context, (4 * PLENTY, Footprint::default()), [2, 2, 8]).is_err());
+    });
+}
+
+#[test]
+fn points_have_the_light_of_a_spot_in_a_mirror_and_paths_alone_none() {
+    with_mirrored_spot(|context| {
+        // On the floor where the mirror sends the light, and in the air above.
+        let at = |i: usize, y: f32| {
+            let step = |i: usize| 0.02 * i as f32;
+            IrradiancePoint::free(Vec3::new(-0.9 + step(i % 16), y, 0.5 + step(i / 16)), Vec3::Y)
+        };
+        let (scene, settings) = (context.scene, PointSettings::default());
+        let values = |height: f32, caustics: bool| {
+            let points: Vec<IrradiancePoint> = (0..256).map(|i| at(i, height)).collect();
+            let mut memory = lines(IrradianceRenderer::required_memory(scene, points.len()).structures);
+            let mut scratch = lines(IrradianceRenderer::scratch().bytes());
+            let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));
+            let settings = PointSettings { caustics, level: Level::BASELINE, ..settings };
+            let mut arena = Arena::over(&mut memory);
+            let mut renderer =
+                IrradianceRenderer::new(scene, &points, &settings, &mut arena, &mut executor).unwrap();
+            renderer.step(&mut executor, Until::Samples(64)).unwrap();
+            let used = renderer.findings().get("caustic_photons").map(|finding| finding.decision);
+            (matches!(used, Some(Used | Limited)), renderer.values().collect::<Vec<_>>())
+        };
+        let (used, lit) = values(0.0, true);
+        // The spot at its place in the mirror, by the cosine law.
+        let [a, b, c] = [9, 10, 11].map(|i| Vec3::from(scene.mesh.positions[i]));
+        let normal = (b - a).cross(c - a).normalize();
+        let PointLight::Spot { position, intensity, .. } = scene.lights[0] else { unreachable!() };
+        let image = position - 2.0 * (position - a).dot(normal) * normal;
+        let direct = |point: &IrradiancePoint| {
+            let way = image - Vec3::from(point.position);
+            0.9 * intensity.x * way.y / way.length().powi(3)
+        };
+        let held = lit.iter().enumerate().filter(|(i, value)| {
+            let expected = direct(&at(*i, 0.0));
+            value.lower <= expected && expected <= value.upper
+        });
+        assert!(used, "{:?}", lit[0]);
+        let (held, mean) = (held.count(), lit.iter().map(|value| value.value()).sum::<f32>() / 256.0);
+        let expected = (0..256).map(|i| direct(&at(i, 0.0))).sum::<f32>() / 256.0;
+        assert!((mean / expected - 1.0).abs() < 0.1 && held > 200, "{mean} {expected} {held}");
+        let (used, dark) = values(0.0, false);
+        assert!(!used && dark.iter().all(|value| value.value() < 0.1 * mean));
+        // No surface stores photons at sensors in the air: there are paths alone.
+        assert!(!values(0.2, true).0);
     });
 }
 

@@ -19,11 +19,20 @@ pub struct PointSettings {
     pub shard: Shard,
     /// Light to estimate.
     pub light: LightPart,
+    /// Caustic photons where a pilot finds that they pay.
+    pub caustics: bool,
 }
 
 impl Default for PointSettings {
     fn default() -> Self {
-        Self { seed: 0, max_depth: None, level: Level::detect(), shard: Shard::WHOLE, light: LightPart::All }
+        Self {
+            seed: 0,
+            max_depth: None,
+            level: Level::detect(),
+            shard: Shard::WHOLE,
+            light: LightPart::All,
+            caustics: true,
+        }
     }
 }
 

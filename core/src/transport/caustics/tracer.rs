@@ -12,7 +12,7 @@ use crate::bvh::Bvh;
 use crate::geometry::Ray;
 use crate::light::{EmissionSampler, LightSampler, LightType, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::photon::Photon;
+use crate::photon::{Photon, PhotonMap};
 use crate::scene::Scene;
 use crate::transport::caustics::merge::is_wide_enough;
 use crate::transport::photon_mapping::deposit::PhotonTracerSettings;
@@ -57,6 +57,8 @@ pub struct CausticPhotonTracer<'a, F> {
     radii: RadiusSchedule,
     /// Pixels across and down.
     frame: [u32; 2],
+    /// Points that see the photons in place of the camera.
+    points: Option<&'a PhotonMap<'a>>,
     beside_records: bool,
 }
 
@@ -96,13 +98,18 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         let PhotonTracerSettings { seed, paths, max_depth, .. } = settings;
         let context = SceneContext::new(scene, bvh, lights, level);
         let walk = LightWalk { context, emission, seed, paths, max_depth };
-        Self { walk, radii, frame, beside_records: false }
+        Self { walk, radii, frame, points: None, beside_records: false }
     }
 
     /// This tracer for photons of
     /// [`CausticMerging::beside_records`](crate::transport::CausticMerging::beside_records).
     pub fn beside_records(self, beside_records: bool) -> Self {
         Self { beside_records, ..self }
+    }
+
+    /// This tracer for photons near any of `points`, if there are some, in place of those seen by the camera.
+    pub fn near(self, points: Option<&'a PhotonMap<'a>>) -> Self {
+        Self { points, ..self }
     }
 
     /// Light paths of a map.
@@ -186,9 +193,20 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         self.walk.follow(task, map, scratch, &mut MisDepositor { tracer: self, store, continues: false })
     }
 
+    /// Block of points in the order of their map with one in a kernel around `position`; `None` if none has.
+    fn block_of(&self, points: &PhotonMap, position: Vec3) -> Option<u32> {
+        let mut found = [0];
+        let count = points.within(self.walk.context.level, position, self.radii.radius(position), &mut found);
+        let blocks = u64::from(BLOCKS * BLOCKS);
+        (count > 0).then(|| (u64::from(found[0]) * blocks / points.len() as u64) as u32)
+    }
+
     /// Block of the picture in which the camera sees `position`, directly or through glass; `None` if it does
     /// not.
     fn block(&self, position: Vec3) -> Option<u32> {
+        if let Some(points) = self.points {
+            return self.block_of(points, position);
+        }
         let context = &self.walk.context;
         let camera = &context.scene.camera;
         let [width, height] = self.frame;

@@ -188,8 +188,9 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
             self.leave_points((points, part), &mut wave, count, &mut counters);
             for i in 0..count {
                 let path = wave.wave.paths[i];
-                if let Some(pixel) = out.get_mut(path.place as usize) {
-                    pixel.add(path.sample, wave.radiance(i) * PI, &mut counters.dropped);
+                let Some(pixel) = out.get_mut(path.place as usize) else { continue };
+                if pixel.add(path.sample, wave.radiance(i) * PI, &mut counters.dropped) {
+                    pixel.add_blur(path.sample, Rgb::from(path.blur) * PI);
                 }
             }
         }
@@ -252,8 +253,14 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
             rest: path.classes,
         };
         let Some(Path { path, state, shared }) = memory.path(wave.paths, i, &mut none) else { return };
+        // Data structures have the light of surfaces: a path from a free point begins as one from a camera.
+        let is_free = point.triangle == MISS;
+        let rest = match is_free {
+            true => RemainingLight::all(&vertex),
+            false => self.known(Path { path, state, shared }, &vertex, E::Found::default()),
+        };
         let rest = match part {
-            LightPart::All => self.known(Path { path, state, shared }, &vertex, E::Found::default()),
+            LightPart::All => rest,
             LightPart::Direct => RemainingLight::of(PathClasses::EMITTED),
             LightPart::Indirect => {
                 RemainingLight { is_lit: true, ..RemainingLight::of(PathClasses::SCATTERED) }
@@ -267,6 +274,9 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
         let Some(path) = memory.path(wave.paths, i, &mut none) else { return };
         if let Some(ray) = self.scatter(path, &vertex, &rest, counters) {
             wave.push_ray(i, ray);
+        }
+        if let Some(state) = memory.states.get_mut(i).filter(|_| is_free) {
+            *state = E::State::zeroed();
         }
     }
 }

@@ -12,14 +12,14 @@ use super::sharing::PathWave;
 use super::sharing::Sharing;
 use crate::Rgb;
 use crate::bsdf::Features;
-use crate::film::{PIXELS_PER_TILE, Tile};
+use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use crate::memory::{Arena, OutOfMemory};
 use crate::transport::settings::Counters;
 use crate::transport::walk::path_classes::PathClasses;
 use bytemuck::Pod;
 
 /// Samples per pixel of the pilot. The mean radiance of the picture comes from sample 0 alone.
-const SAMPLES: u32 = 4;
+pub const SAMPLES: u32 = 4;
 
 /// Cost of a connection between two paths, in other rays including the shading of their hits (measured: 0.2
 /// in a box, 0.3 in a room of 400,000 triangles).
@@ -202,17 +202,40 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
 }
 
 impl Pilot {
+    /// The pilot of points by four samples of each of `pixels`, whose light is `scale` times that of samples
+    /// and of about this `mean`.
+    pub fn of_points(pixels: &[Pixel], (scale, mean): (f32, f32), counters: &Counters) -> Self {
+        let rays = (counters.rays + counters.shadow_rays) as f64;
+        let mut pilot = Self { rays, samples: counters.paths as f64, ..Self::default() };
+        let pairs = pixels.iter().enumerate().flat_map(|(place, pixel)| {
+            let halves = pixel.even.parts().zip(pixel.odd.parts());
+            let pairs =
+                halves.map(|(even, odd)| [0, 1].map(|i| [even[i], odd[i]].map(|light| scale * light)));
+            pairs.into_iter().flatten().map(move |[a, b]| (place, [a, b], a - b))
+        });
+        pilot.add_pairs(pairs, mean);
+        pilot
+    }
+
     /// Adds the squared differences between samples of the same pixel.
     fn compare<S: Pod>(&mut self, wave: &PathWave<S, PathReuse>, count: usize, mean: f32) {
         let paths = &wave.wave.paths;
-        let shared = |i: usize| wave.radiance(i);
         let layer = paths[..count].iter().take_while(|path| path.sample == paths[0].sample).count();
+        let pairs = (layer..count).map(|i| {
+            let shared = [i, i - layer].map(|i| wave.radiance(i));
+            let [a, b] = [i, i - layer].map(|i| Rgb::from(paths[i].throughput));
+            (paths[i].place as usize, shared, a - b)
+        });
+        self.add_pairs(pairs, mean);
+    }
+
+    /// Adds pairs of samples of the pixel at a place of the tile: both with sharing, and their difference
+    /// without.
+    fn add_pairs(&mut self, pairs: impl Iterator<Item = (usize, [Rgb; 2], Rgb)>, mean: f32) {
         let mut blocks = [Block::default(); PIXELS_PER_TILE / BLOCK];
-        for i in layer..count {
-            let (a, b) = (shared(i), shared(i - layer));
+        for (place, [a, b], alone) in pairs {
             let light = (a + b).element_sum() / 6.0;
             let weight = 1.0 / (light * light + 0.01 * mean * mean);
-            let alone = Rgb::from(paths[i].throughput) - Rgb::from(paths[i - layer].throughput);
             let squares = [alone.length_squared(), (a - b).length_squared()];
             // Skip pairs without light, or with light that is not finite.
             let [alone, shared] = squares.map(|square| square * weight);
@@ -220,7 +243,7 @@ impl Pilot {
                 self.alone += f64::from(alone);
                 self.shared += f64::from(shared);
                 self.pairs += 1.0;
-                if let Some(block) = blocks.get_mut(paths[i].place as usize / BLOCK) {
+                if let Some(block) = blocks.get_mut(place / BLOCK) {
                     block.light += light;
                     block.squares = [0, 1].map(|k| block.squares[k] + squares[k]);
                     block.pairs += 1.0;

@@ -1,4 +1,5 @@
-//! Focus of the light from infinity: a sphere around half of the surfaces that camera rays meet.
+//! Focus of the light from infinity: a sphere around half of the surfaces that camera rays meet, or around
+//! half of some points.
 
 use crate::Level;
 use crate::bvh::Bvh;
@@ -8,12 +9,14 @@ use glam::Vec3;
 
 /// Number of rays across and down.
 const RAYS_PER_SIDE: u32 = 16;
-const RAYS: usize = (RAYS_PER_SIDE * RAYS_PER_SIDE) as usize;
+
+/// Most points of a focus.
+pub const FOCUS_POINTS: usize = (RAYS_PER_SIDE * RAYS_PER_SIDE) as usize;
 
 /// Sphere around the median of the surfaces that the camera sees in a picture of `frame` pixels across and
 /// down; `None` if it sees none.
 pub fn visible_focus((scene, bvh): (&Scene, &Bvh), frame: [u32; 2], level: Level) -> Option<Focus> {
-    let (mut points, mut count) = ([Vec3::ZERO; RAYS], 0);
+    let (mut points, mut count) = ([Vec3::ZERO; FOCUS_POINTS], 0);
     for i in 0..RAYS_PER_SIDE * RAYS_PER_SIDE {
         let at = |i: u32, pixels: u32| (i as f32 + 0.5) * pixels as f32 / RAYS_PER_SIDE as f32;
         let (x, y) = (at(i % RAYS_PER_SIDE, frame[0]), at(i / RAYS_PER_SIDE, frame[1]));
@@ -24,8 +27,12 @@ pub fn visible_focus((scene, bvh): (&Scene, &Bvh), frame: [u32; 2], level: Level
             count += 1;
         }
     }
-    let points = points.get(..count)?;
-    let mut values = [0.0; RAYS];
+    focus_on(points.get(..count)?)
+}
+
+/// Sphere around the median of `points`, of which there are at most [`FOCUS_POINTS`]; `None` without extent.
+pub fn focus_on(points: &[Vec3]) -> Option<Focus> {
+    let (mut values, count) = ([0.0; FOCUS_POINTS], points.len());
     let mut median = |value: &dyn Fn(&Vec3) -> f32| {
         let values = values.get_mut(..count)?;
         values.iter_mut().zip(points).for_each(|(slot, point)| *slot = value(point));

@@ -3,6 +3,7 @@
 
 use crate::Level;
 use crate::bvh::Bvh;
+use crate::geometry::Bounds;
 use crate::scene::Scene;
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -49,6 +50,13 @@ impl RadiusSchedule {
             (MIN_DISTANCE_IN_DIAGONALS * bvh.bounds().diagonal()).min(MIN_DISTANCE_OF_VISIBLE * seen);
         let radius = 2.0 * camera.tan_half_fov / frame[1].max(1) as f32;
         Self { eye: camera.eye, radius, nearest }
+    }
+
+    /// Schedule of the same `radius` everywhere within `bounds`.
+    pub fn constant(radius: f32, bounds: &Bounds) -> Self {
+        // No place is farther from the centre.
+        let nearest = bounds.diagonal().max(f32::MIN_POSITIVE);
+        Self { eye: bounds.center(), radius: radius / nearest, nearest }
     }
 
     /// This schedule with a radius of `pixels` pixels.
