@@ -1,6 +1,7 @@
 //! Studies: experiments on parts of a method.
 
 mod irradiance;
+mod points;
 mod radiance;
 mod reconstruction;
 mod threads;
@@ -20,6 +21,7 @@ pub(crate) struct Study {
 #[derive(Subcommand)]
 enum Subject {
     Irradiance(Box<irradiance::Irradiance>),
+    Points(points::Points),
     Radiance(radiance::Radiance),
     Reconstruction(reconstruction::Reconstruction),
 }
@@ -28,6 +30,7 @@ impl Study {
     pub(crate) fn run(&self, output: &mut Output) -> Result<()> {
         match &self.subject {
             Subject::Irradiance(study) => study.run(output),
+            Subject::Points(study) => study.run(output),
             Subject::Radiance(study) => study.run(output),
             Subject::Reconstruction(study) => study.run(output),
         }
