@@ -2,15 +2,18 @@
 //! brightness of the neighbours (after the moderated variances of Smyth 2004).
 //!
 //! Most points have not met rare light, and their own samples do not show its variance; those of near points
-//! do. For a block of points with the half-means A and B and the four quarter-means q:
+//! do. For a block of points with the half-means A and B, which are independent of each other:
 //!
-//! 1. m = (A + B) / 2. The mean of (A − B)² / 4 over the block is s, the variance of m. The density bias of
-//!    photons adds its square, the product of its estimates by the halves. The variance of the quarters
-//!    v = Σ (q − m)² / 12 has its shape.
+//! 1. m = (A + B) / 2, and v = (A − B)² / 4, of which the expectation is the variance of m. The density bias
+//!    of photons adds its square to v, the product of its estimates by the halves. v̄ is the mean over the
+//!    block.
 //! 2. k, the mean of m over the nearest other points. The expected v of a point rises with k: β is the slope
-//!    of v over m, and τ = max(v̄ + β (k − m̄), v̄ / 10) / v̄. The m of a point is correlated with its own v,
+//!    of v over m, and τ = max(1 + β (k − m̄) / v̄, 1 / 10). The m of a point is correlated with its own v,
 //!    that of its neighbours is not.
-//! 3. V = s τ (8 + 3 min(v / (v̄ τ), 50)) / 11. The interval is m ± t₁₁ √V, and not below 0.
+//! 3. V = v̄ τ (8 + min(v / (v̄ τ), 50)) / 9. The interval is m ± t₉ √V, and not below 0.
+//!
+//! Quarters of the samples have a better count of degrees of freedom, but are no independent estimates: those
+//! of a half share its stratification and its photons.
 
 use super::student::{NORMAL_95, student_quantile};
 use crate::film::Pixel;
@@ -27,9 +30,9 @@ const NEIGHBOURS: usize = 6;
 /// Smallest expected variance of a point in means of its block.
 const LEAST_TREND: f32 = 0.1;
 
-/// Degrees of freedom of the block and of the quarters of a point.
+/// Degrees of freedom of the block and of the halves of a point.
 const POOLED_FREEDOM: f32 = 8.0;
-const OWN_FREEDOM: f32 = 3.0;
+const OWN_FREEDOM: f32 = 1.0;
 
 /// Largest variance of a point in expected ones: a single firefly is no variance.
 const MOST_OWN: f32 = 50.0;
@@ -42,27 +45,23 @@ pub(super) type Place = (Vec3, Vec3);
 struct Sums {
     /// Mean of both halves.
     mean: f32,
-    /// Squared difference of the halves, quartered, and the square of the density bias by both.
-    halves: f32,
-    /// Variance of the mean by its quarters.
-    quarters: f32,
+    /// Its squared error by their difference and by the density bias.
+    square: f32,
 }
 
 impl Sums {
     fn of(pixel: &Pixel) -> Option<Self> {
-        let [even, odd] = [pixel.even.parts()?, pixel.odd.parts()?];
-        let quarters = [even[0], even[1], odd[0], odd[1]].map(luminance);
-        let halves = [pixel.even.mean(), pixel.odd.mean()].map(luminance);
-        let mean = 0.5 * (halves[0] + halves[1]);
-        let square = |x: f32| x * x;
-        let spread: f32 = quarters.iter().map(|q| square(q - mean)).sum();
-        let bias = pixel.even.blur() * pixel.odd.blur();
-        Some(Self { mean, halves: 0.25 * square(halves[0] - halves[1]) + bias, quarters: spread / 12.0 })
+        if pixel.even.count() == 0 || pixel.odd.count() == 0 {
+            return None;
+        }
+        let [even, odd] = [pixel.even.mean(), pixel.odd.mean()].map(luminance);
+        let square = 0.25 * (even - odd) * (even - odd) + pixel.even.blur() * pixel.odd.blur();
+        Some(Self { mean: 0.5 * (even + odd), square: square.max(0.0) })
     }
 }
 
 /// Writes the variance of the mean luminance of each of at most [`POOLED_POINTS`] `pixels` to `variances`;
-/// infinite where a quarter has no sample.
+/// infinite where a half has no sample.
 pub fn point_variances(pixels: &[Pixel], place: impl Fn(usize) -> Place, variances: &mut [f32]) {
     variances.fill(f32::INFINITY);
     let count = pixels.len().min(POOLED_POINTS);
@@ -77,23 +76,22 @@ pub fn point_variances(pixels: &[Pixel], place: impl Fn(usize) -> Place, varianc
         return;
     }
     let mean_of = |value: fn(&Sums) -> f32| known().map(value).sum::<f32>() / number as f32;
-    let (mean, pooled) = (mean_of(|p| p.mean), mean_of(|p| p.halves).max(0.0));
-    let quarters = mean_of(|p| p.quarters);
+    let (mean, pooled) = (mean_of(|p| p.mean), mean_of(|p| p.square));
     let slope = {
         let square: f32 = known().map(|p| (p.mean - mean) * (p.mean - mean)).sum();
-        let product: f32 = known().map(|p| (p.mean - mean) * (p.quarters - quarters)).sum();
+        let product: f32 = known().map(|p| (p.mean - mean) * (p.square - pooled)).sum();
         if square > 0.0 { (product / square).max(0.0) } else { 0.0 }
     };
     for (i, variance) in variances.iter_mut().enumerate().take(count) {
         let Some(point) = points[i] else { continue };
-        if quarters <= 0.0 {
-            *variance = pooled;
+        if pooled <= 0.0 {
+            *variance = 0.0;
             continue;
         }
         let around = mean_around(&points[..count], &places[..count], i).unwrap_or(mean);
-        let trend = (1.0 + slope * (around - mean) / quarters).max(LEAST_TREND);
-        let own = (point.quarters / (quarters * trend)).min(MOST_OWN);
-        *variance = pooled * trend * (POOLED_FREEDOM + OWN_FREEDOM * own) / (POOLED_FREEDOM + OWN_FREEDOM);
+        let expected = pooled * (1.0 + slope * (around - mean) / pooled).max(LEAST_TREND);
+        let own = (point.square / expected).min(MOST_OWN);
+        *variance = expected * (POOLED_FREEDOM + OWN_FREEDOM * own) / (POOLED_FREEDOM + OWN_FREEDOM);
     }
 }
 
@@ -175,15 +173,15 @@ mod tests {
     }
 
     #[test]
-    fn points_without_four_quarters_have_no_interval() {
+    fn points_without_two_halves_have_no_interval() {
         let mut pixels = [Pixel::default(); 3];
-        for sample in 0..3 {
+        for sample in [0, 2] {
             pixels[0].add(sample, Rgb::ONE, &mut Dropped::default());
         }
         let mut variances = [0.0; 3];
         point_variances(&pixels, |_| (Vec3::ZERO, Vec3::Z), &mut variances);
         assert!(variances.iter().all(|variance| *variance == f32::INFINITY));
-        for sample in 0..4 {
+        for sample in 0..2 {
             pixels[1].add(sample, Rgb::ONE, &mut Dropped::default());
         }
         point_variances(&pixels, |_| (Vec3::ZERO, Vec3::Z), &mut variances);

@@ -43,7 +43,7 @@ pub struct PointIrradiance {
     pub irradiance: Rgb,
     /// Lower end of the 95 % interval of its luminance.
     pub lower: f32,
-    /// Upper end; infinite below four samples.
+    /// Upper end; infinite below two samples.
     pub upper: f32,
     /// Number of samples.
     pub samples: u32,
