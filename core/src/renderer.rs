@@ -15,6 +15,8 @@ pub use crate::reconstruction::ReconstructionError;
 pub use audited::OutOfReach;
 pub use error::RenderError;
 pub use of_features::FeatureRenderer;
+#[doc(hidden)]
+pub use points::PointFilm;
 pub use points::{IrradianceRenderer, PointIrradiance, PointSettings};
 #[doc(hidden)]
 pub use rounds::{Estimates, Plan, Rounds, Stop, StopRule};

@@ -41,9 +41,7 @@ fn sensors_of_standard_input_give_a_table_on_standard_output() {
 #[test]
 fn tables_have_the_bits_of_any_number_of_threads() {
     let folder = Folder::new("bake-threads");
-    let grid: String =
-        (0..600).map(|i| format!("{} 0.0 {} 0 1 0\n", i % 25 * 2 / 25, i as f64 / 300.0 - 1.0)).collect();
-    std::fs::write(folder.path("grid.pts"), grid).unwrap();
+    write_grid(&folder);
     let table = |threads: usize| {
         let name = format!("{threads}.csv");
         let object = folder.object(&format!(
@@ -53,6 +51,108 @@ fn tables_have_the_bits_of_any_number_of_threads() {
         std::fs::read(folder.path(&name)).unwrap()
     };
     assert_eq!(table(1), table(3));
+}
+
+/// Sensors on the floor, three tiles of them.
+fn write_grid(folder: &Folder) {
+    let grid: String = (0..600)
+        .map(|i| format!("{} 0.0 {} 0 1 0\n", (i % 25) as f64 / 12.5 - 1.0, i as f64 / 300.0 - 1.0))
+        .collect();
+    std::fs::write(folder.path("grid.pts"), grid).unwrap();
+}
+
+#[test]
+fn shards_of_a_bake_merge_to_the_bits_of_one() {
+    let folder = Folder::new("bake-shards");
+    write_grid(&folder);
+    let bake = "bake scene.obj --points grid.pts --unit lux --spp 24 --json";
+    folder.object(&format!("{bake} -o whole.csv -o whole.ply --threads 1"));
+    for shard in 1..=3 {
+        folder.object(&format!("{bake} --shard {shard}/3 --checkpoint {shard}.bake --threads {shard}"));
+    }
+    let merged = folder.object("merge 3.bake 1.bake 2.bake -o merged.csv -o merged.ply --json");
+    assert_eq!((&merged["points"], &merged["spp"]), (&600.into(), &24.into()));
+    for ending in ["csv", "ply"] {
+        let [whole, merged] =
+            ["whole", "merged"].map(|name| std::fs::read(folder.path(&format!("{name}.{ending}"))).unwrap());
+        assert!(whole == merged, "{ending}");
+    }
+    folder.object(&format!("{bake} --seed 9 --shard 2/3 --checkpoint seed.bake"));
+    folder.object("bake scene.obj --points grid.pts --spp 8 --shard 2/3 --checkpoint few.bake --json");
+    folder.object("render scene.obj --size 16x16 --spp 1 --checkpoint picture.film -o p.pfm --json");
+    for (arguments, reason) in [
+        ("merge 1.bake 2.bake -o no.csv", "shard 3/3 is missing"),
+        ("merge 1.bake seed.bake 3.bake -o no.csv", "it is a bake of seed 9, not 0"),
+        ("merge 1.bake few.bake 3.bake -o no.csv", "a bake of 8 samples, not of 24"),
+        ("merge 1.bake picture.film -o no.csv", "picture.film: is no bake file"),
+        ("merge 1.bake 2.bake 3.bake -o no.png", "a table is .csv, .res or .ply"),
+        ("bake scene.obj --points grid.pts --shard 1/3 --spp 4", "--checkpoint"),
+        ("bake scene.obj --points grid.pts --shard 1/3 --error 0.1 --checkpoint a.bake", "--error"),
+        (
+            "bake scene.obj --points grid.pts --spp 4 --shard 4/4 --checkpoint a.bake",
+            "the shard does not exist",
+        ),
+    ] {
+        let said = folder.refused(arguments);
+        assert!(said.contains(reason), "{arguments}: {said}");
+    }
+    assert!(!folder.path("no.csv").exists());
+}
+
+#[test]
+fn a_bake_goes_on_from_its_file_with_the_same_bits() {
+    let folder = Folder::new("bake-resumed");
+    write_grid(&folder);
+    let bake = "bake scene.obj --points grid.pts --error 0.01";
+    folder.object(&format!("{bake} -o whole.csv --json"));
+    let table = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    // Ended between decisions, at a decision, and before the first one.
+    for spp in [5, 64, 100] {
+        let first = folder.object(&format!("{bake} --spp {spp} --checkpoint a.bake -o a.csv --json"));
+        assert_eq!(first["samples"]["most"], spp);
+        let name = format!("{spp}.csv");
+        folder.object(&format!("{bake} --resume a.bake --checkpoint a.bake -o {name} --json"));
+        assert!(table(&name) == table("whole.csv"), "{spp}");
+    }
+    // Fewer samples than the file has: its values.
+    folder.object("bake scene.obj --points grid.pts --resume a.bake --spp 5 -o again.csv --json");
+    assert!(table("again.csv") == table("whole.csv"));
+    let said = folder.refused(&format!("{bake} --light direct --resume a.bake"));
+    assert!(said.contains("a.bake: is a bake of light all, not direct"), "{said}");
+    let mut bytes = table("a.bake");
+    bytes[2000] ^= 1;
+    std::fs::write(folder.path("bad.bake"), bytes).unwrap();
+    let said = folder.refused(&format!("{bake} --resume bad.bake"));
+    assert!(said.contains("bad.bake: is damaged"), "{said}");
+}
+
+#[test]
+fn a_killed_bake_leaves_a_file_that_goes_on() {
+    let folder = Folder::new("bake-killed");
+    write_grid(&folder);
+    let bake = "bake scene.obj --points grid.pts --spp 3000";
+    folder.object(&format!("{bake} -o whole.csv --json"));
+    let kept = format!("{bake} -o parts.csv --checkpoint a.bake --checkpoint-every 1ms");
+    let spawn = |arguments: &str| {
+        folder.command(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    // Killed as soon as there is a file, and a new one.
+    let mut child = spawn(&kept);
+    for kills in 0.. {
+        let before = std::fs::read(folder.path("a.bake")).ok();
+        while child.try_wait().unwrap().is_none() && std::fs::read(folder.path("a.bake")).ok() == before {
+            std::thread::yield_now();
+        }
+        if kills == 8 || child.try_wait().unwrap().is_some() {
+            break;
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        child = spawn(&format!("{kept} --resume a.bake"));
+    }
+    assert!(child.wait().unwrap().success());
+    let [whole, parts] = ["whole", "parts"].map(|name| std::fs::read(folder.path(&format!("{name}.csv"))));
+    assert!(whole.unwrap() == parts.unwrap());
 }
 
 #[test]

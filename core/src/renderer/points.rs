@@ -1,24 +1,23 @@
 //! Irradiance at points, each with a 95 % interval, in the caller's memory and on the caller's threads.
 
+mod film;
 mod layout;
 mod value;
 
+pub use film::PointFilm;
 pub use value::{PointIrradiance, PointSettings};
 
 use super::build::{Build, build_for, of_build};
 use super::{RenderError, RequiredMemory, Until};
 use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::bvh::Bvh;
-use crate::estimate::{POOLED_POINTS, half_width, point_variances};
-use crate::film::{PIXELS_PER_TILE, Pixel, TILE};
+use crate::film::{PIXELS_PER_TILE, Pixel};
 use crate::findings::Findings;
 use crate::light::{LightSampler, luminance};
 use crate::memory::{Arena, Buffer, Footprint, OutOfMemory};
 use crate::method::{Executor, IrradiancePoints, PilotSize, RenderContext, RenderState, Round};
-use crate::reconstruction::for_pieces;
 use crate::scene::Scene;
 use crate::transport::{Counters, IrradiancePoint, PathSettings, UNLIMITED};
-use glam::Vec3;
 use layout::{Layout, number_of, order_along_curve};
 use libm::{ceil, fmin, sqrt};
 
@@ -50,14 +49,7 @@ type Builds<'a> =
 /// Irradiance of many points in progress.
 pub struct IrradianceRenderer<'a> {
     build: Builds<'a>,
-    /// The points in the order of the film.
-    points: &'a [IrradiancePoint],
-    layout: Layout,
-    /// Place in the film of each replicate of each point.
-    places: &'a [u32],
-    state: RenderState<'a>,
-    /// Half-width of each pixel after the last step.
-    half_widths: &'a mut [f32],
+    film: PointFilm<'a>,
     /// 1 for each tile that has reached the error.
     finished: &'a mut [u8],
     /// Samples at which tiles are judged next.
@@ -131,16 +123,13 @@ impl<'a> IrradianceRenderer<'a> {
         if shard.index >= shard.count || shard.count as usize > layout.tiles() {
             return Err(RenderError::Shard);
         }
-        let (width, height) = (TILE, TILE * layout.tiles() as u32);
+        let [width, height] = layout.size();
         let max_depth = settings.max_depth.unwrap_or(UNLIMITED);
         let paths = PathSettings { width, height, seed, max_depth };
         let context = RenderContext { scene, bvh, lights, settings: paths, level, pilots: PilotSize::USUAL };
-        let state = RenderState::new(width, height, shard, arena)?;
         let pixels = layout.pixels();
         let (ordered, keys) = (arena.slice::<IrradiancePoint>(pixels)?, arena.slice::<u64>(pixels)?);
-        let (places, half_widths) = (arena.slice::<u32>(pixels)?, arena.slice::<f32>(pixels)?);
-        let finished = arena.slice::<u8>(layout.tiles())?;
-        half_widths.fill(f32::INFINITY);
+        let (places, finished) = (arena.slice::<u32>(pixels)?, arena.slice::<u8>(layout.tiles())?);
         finished.fill(0);
         order_along_curve(points, layout.replicates, keys);
         for (place, key) in keys.iter().enumerate() {
@@ -158,13 +147,13 @@ impl<'a> IrradianceRenderer<'a> {
             Ok(Counters::default())
         })?;
         // Without positions nothing can be sampled: the film stays empty.
-        let points = if passed.is_complete { &*ordered } else { &[] };
+        let ordered = if passed.is_complete { &*ordered } else { &[] };
+        let film = PointFilm::new(points.len(), (ordered, places), shard, arena)?;
         let photons = IrradiancePoints::<All>::footprint(scene, pixels).bytes();
         let memory = &mut Buffer::new(arena.slice(photons.min(arena.available()))?);
-        let wanted = (points, settings.light, settings.caustics);
+        let wanted = (ordered, settings.light, settings.caustics);
         let build = build_for!(scene, IrradiancePoints::new(&context, wanted, memory, executor)?);
-        let (decision, error) = (FIRST_DECISION, 0.0);
-        Ok(Self { build, points, layout, places, state, half_widths, finished, decision, error })
+        Ok(Self { build, film, finished, decision: FIRST_DECISION, error: 0.0 })
     }
 
     /// Adds samples to each point `until` the given end, or until the executor is over. By an error, tiles of
@@ -177,7 +166,7 @@ impl<'a> IrradianceRenderer<'a> {
         match until {
             Until::Samples(target) => {
                 self.sample(executor, target, |_, _| true)?;
-                self.estimate(executor);
+                self.film.estimate(executor);
                 Ok(())
             }
             Until::Error(error) => self.step_within(executor, error, MOST_SAMPLES),
@@ -195,30 +184,55 @@ impl<'a> IrradianceRenderer<'a> {
         most: u32,
     ) -> Result<(), RenderError> {
         self.sample_within((error, most), executor)?;
-        self.estimate(executor);
+        self.film.estimate(executor);
         Ok(())
     }
 
     /// Irradiance of each point, in the order of the points.
     pub fn values(&self) -> impl Iterator<Item = PointIrradiance> + '_ {
-        let Self { layout, places, state, half_widths, .. } = self;
-        let each = places.chunks(layout.replicates);
-        each.map(move |places| PointIrradiance::of_replicates(places, state.film.pixels(), half_widths))
+        self.film.values()
     }
 
     /// Samples of the least sampled point.
     pub fn samples(&self) -> u32 {
-        self.state.spp()
+        self.film.state.spp()
     }
 
     /// Number of tiles of near points, and of those that have reached the error of the last step.
     pub fn tiles(&self) -> [usize; 2] {
-        [self.state.tiles(), self.finished.iter().filter(|finished| **finished != 0).count()]
+        [self.film.state.tiles(), self.finished.iter().filter(|finished| **finished != 0).count()]
     }
 
     /// Sums of the samples. Pixels are points along a Z-curve.
     pub fn state(&self) -> &RenderState<'a> {
-        &self.state
+        &self.film.state
+    }
+
+    /// The film, which is its own without a scene.
+    #[doc(hidden)]
+    pub fn film(&self) -> &PointFilm<'a> {
+        &self.film
+    }
+
+    /// The samples at which tiles are judged next, the error, and 1 for each tile that has reached it.
+    #[doc(hidden)]
+    pub fn decisions(&self) -> (u32, f64, &[u8]) {
+        (self.decision, self.error, self.finished)
+    }
+
+    /// Continues an earlier run: its decisions, and the sums that `fill` puts into the film.
+    ///
+    /// # Errors
+    /// Those of `fill`.
+    #[doc(hidden)]
+    pub fn resume<E>(
+        &mut self,
+        (decision, error, finished): (u32, f64, &[u8]),
+        fill: impl FnOnce(&mut RenderState<'a>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        (self.decision, self.error) = (decision.max(FIRST_DECISION), error);
+        self.finished.iter_mut().zip(finished).for_each(|(tile, finished)| *tile = *finished);
+        fill(&mut self.film.state)
     }
 
     /// Decisions and numbers of caustic photons.
@@ -228,7 +242,7 @@ impl<'a> IrradianceRenderer<'a> {
 
     /// Rays and rejected samples so far.
     pub fn counters(&self) -> Counters {
-        self.state.counters
+        self.film.state.counters
     }
 
     /// Brings the tiles that are open to `target` samples.
@@ -238,9 +252,9 @@ impl<'a> IrradianceRenderer<'a> {
         target: u32,
         is_open: impl Fn(&[u8], usize) -> bool + Send + Sync,
     ) -> Result<(), OutOfMemory> {
-        let Self { build, state, finished, .. } = self;
+        let Self { build, film, finished, .. } = self;
         let finished = &**finished;
-        let round = &mut Round { executor, state, target, step: STEP };
+        let round = &mut Round { executor, state: &mut film.state, target, step: STEP };
         of_build!(build, method => method.sample(round, |tile| is_open(finished, tile)))
     }
 
@@ -259,7 +273,7 @@ impl<'a> IrradianceRenderer<'a> {
             if executor.is_over() || !is_decision {
                 return Ok(());
             }
-            self.estimate(executor);
+            self.film.estimate(executor);
             self.finish_tiles(error as f32);
             if target == MOST_SAMPLES {
                 return Ok(());
@@ -269,32 +283,12 @@ impl<'a> IrradianceRenderer<'a> {
         Ok(())
     }
 
-    /// Half-widths of all points.
-    fn estimate(&mut self, executor: &mut impl Executor) {
-        let (points, total, pixels) = (self.points, self.layout.pixels(), self.state.film.pixels());
-        let place = |i: usize| {
-            let point = points.get(i).copied().unwrap_or_default();
-            (Vec3::from(point.position), Vec3::from(point.normal))
-        };
-        for_pieces(executor, self.half_widths, POOLED_POINTS, |block, out| {
-            // The last block is a whole one as well.
-            let end = ((block + 1) * POOLED_POINTS).min(total);
-            let start = end.saturating_sub(POOLED_POINTS);
-            let mut variances = [f32::INFINITY; POOLED_POINTS];
-            point_variances(&pixels[start..end], |i| place(start + i), &mut variances);
-            let skipped = block * POOLED_POINTS - start;
-            for (half, variance) in out.iter_mut().zip(variances.iter().skip(skipped)) {
-                *half = half_width(*variance);
-            }
-        });
-    }
-
     /// Opens all tiles where `error` is another than before.
     fn aim_at(&mut self, error: f64) {
         if self.error != error {
             self.finished.fill(0);
             self.error = error;
-            let samples = self.state.samples.iter().copied().max().unwrap_or_default();
+            let samples = self.film.state.samples.iter().copied().max().unwrap_or_default();
             self.decision = FIRST_DECISION;
             while self.decision < samples {
                 self.decision = next_decision(self.decision);
@@ -304,22 +298,23 @@ impl<'a> IrradianceRenderer<'a> {
 
     /// True if a tile of the shard has not reached the error.
     fn has_open_tiles(&self) -> bool {
-        let shard = self.state.shard;
+        let shard = self.film.state.shard;
         self.finished.iter().enumerate().any(|(tile, finished)| *finished == 0 && shard.owns(tile))
     }
 
     /// Marks the tiles in which enough points are within `error`.
     fn finish_tiles(&mut self, error: f32) {
-        let pixels = &self.state.film.pixels()[..self.layout.pixels()];
+        let PointFilm { layout, ref state, ref half_widths, .. } = self.film;
+        let pixels = &state.film.pixels()[..layout.pixels()];
         let (sum, count) = pixels
             .iter()
             .filter(|pixel| pixel.count() > 0)
             .fold((0.0, 0u64), |(sum, count), pixel| (sum + f64::from(luminance(pixel.mean())), count + 1));
         let offset = OFFSET * (sum / count.max(1) as f64) as f32;
-        let tiles = pixels.chunks(PIXELS_PER_TILE).zip(self.half_widths.chunks(PIXELS_PER_TILE));
+        let tiles = pixels.chunks(PIXELS_PER_TILE).zip(half_widths.chunks(PIXELS_PER_TILE));
         for ((pixels, half_widths), finished) in tiles.zip(self.finished.iter_mut()) {
             // Replicates of a point average their noise.
-            let each = libm::sqrtf(self.layout.replicates as f32);
+            let each = libm::sqrtf(layout.replicates as f32);
             let is_within =
                 |(pixel, half): (&Pixel, &f32)| *half <= each * error * (luminance(pixel.mean()) + offset);
             let within = pixels.iter().zip(half_widths).filter(|pair| is_within(*pair)).count();

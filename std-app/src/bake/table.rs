@@ -74,7 +74,7 @@ impl TableFormat {
     }
 }
 
-/// Writes the `values` at `sensors`, with their fractions of back faces, or none.
+/// Writes the `values` at `sensors`, with their fractions of back faces; NaN stands for missing ones.
 ///
 /// # Errors
 /// Those of `out`.
@@ -84,7 +84,7 @@ pub fn write_table(
     sensors: &[Sensor],
     (values, back_faces): (&[PointIrradiance], &[f32]),
 ) -> io::Result<()> {
-    let shares = back_faces.iter().copied().chain(core::iter::repeat(0.0));
+    let shares = back_faces.iter().copied().chain(core::iter::repeat(f32::NAN));
     let rows = sensors.iter().zip(values).zip(shares).map(|((sensor, point), back_faces)| {
         let ([value, lower, upper], rgb) = quantity.of(point);
         Row { sensor, rgb, value, lower, upper, samples: point.samples, back_faces }

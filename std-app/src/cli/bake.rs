@@ -3,6 +3,7 @@
 mod lightmap;
 mod probes;
 
+use super::bake_parts::BakeParts;
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::outputs::{Outputs, Role};
@@ -11,13 +12,13 @@ use super::progress::ProgressReporter;
 use super::{print_note, values};
 use clap::{Args, ValueEnum};
 use halflight::bake::{
-    self, BakeSettings, Baked, Quantity, Sensor, TableFormat, read_sensors, vertices, write_table,
+    self, BakeSettings, Baked, Quantity, Sensor, TableFormat, attachment, read_sensors, vertices, write_table,
 };
 use halflight::load::{self, LoadOptions, LoadedScene};
 use halflight::memory::Budget;
 use halflight::quantity::readable_seconds;
 use halflight::render::Stop;
-use halflight::report::{file_name, findings};
+use halflight::report::{file_name, findings_object};
 use halflight::values::{Depth, Samples, TargetError};
 use halflight_core::{IrradiancePoint, LightPart};
 use serde_json::{Value, json};
@@ -82,6 +83,8 @@ pub(super) struct Bake {
     /// machine's]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
     memory: Option<usize>,
+    #[command(flatten)]
+    parts: BakeParts,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
@@ -118,8 +121,9 @@ impl Bake {
             return run;
         }
         let mut outputs = Outputs::new(self.json);
-        let tables = self.tables()?;
+        let tables = tables(&self.output)?;
         tables.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
+        self.parts.plan(&mut outputs)?;
         let file = self.points.as_deref().filter(|file| *file != Path::new("-"));
         file.map_or(Ok(()), |file| outputs.protect(file))?;
         let mut budget = Budget::new(self.memory);
@@ -131,11 +135,13 @@ impl Bake {
             Some(sensors) => (sensors.iter().map(|sensor| sensor.point(&loaded)).collect(), sensors),
             None => vertices(&loaded),
         };
-        let baked = self.bake(&loaded, &points, self.memory)?;
+        let attached = attachment(&sensors, self.quantity());
+        let baked = self.bake(&loaded, &points, (self.memory, attached))?;
+        baked.unsaved.iter().for_each(|why| outputs.fail(why.clone()));
         for (path, format) in &tables {
             outputs.save_table(path, |out| self.write(out, *format, &sensors, &baked));
         }
-        if tables.is_empty() && !self.json {
+        if tables.is_empty() && !self.json && !self.parts.is_part() {
             let mut table = Vec::new();
             self.write(&mut table, TableFormat::Csv, &sensors, &baked)?;
             print_note(self.text(&baked));
@@ -154,21 +160,11 @@ impl Bake {
         Ok(loaded)
     }
 
-    /// Files and formats of the tables.
-    fn tables(&self) -> Result<Vec<(PathBuf, TableFormat)>, Failure> {
-        let format = |path: &PathBuf| match TableFormat::of(path) {
-            Some(format) => Ok((path.clone(), format)),
-            None => Err(Failure::new(format!("{}: a table is .csv, .res or .ply", path.display()))
-                .advice("choose a name with one of these endings")),
-        };
-        self.output.iter().map(format).collect()
-    }
-
     fn bake(
         &self,
         loaded: &LoadedScene,
         points: &[IrradiancePoint],
-        memory: Option<usize>,
+        (memory, attached): (Option<usize>, Vec<u8>),
     ) -> Result<Baked, Failure> {
         let views = loaded.views();
         let scene = views.scene(loaded.camera_or_default());
@@ -194,6 +190,7 @@ impl Bake {
             back_faces: self.has_back_faces(),
             ..BakeSettings::default()
         };
+        let settings = self.parts.add_to(settings, attached);
         interrupt::install_handler()?;
         let mut reporter = ProgressReporter::new();
         let mut progress = |progress: &bake::BakeProgress| {
@@ -267,6 +264,16 @@ impl Bake {
             baked.values.len(),
         )
     }
+}
+
+/// Files and formats of tables.
+pub(super) fn tables(paths: &[PathBuf]) -> Result<Vec<(PathBuf, TableFormat)>, Failure> {
+    let format = |path: &PathBuf| match TableFormat::of(path) {
+        Some(format) => Ok((path.clone(), format)),
+        None => Err(Failure::new(format!("{}: a table is .csv, .res or .ply", path.display()))
+            .advice("choose a name with one of these endings")),
+    };
+    paths.iter().map(format).collect()
 }
 
 fn code(baked: &Baked) -> ExitCode {

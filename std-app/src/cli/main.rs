@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod bake;
+mod bake_parts;
 mod camera_args;
 mod compare;
 mod failure;

@@ -1,26 +1,29 @@
-//! `halflight merge`: a picture from the films of all shards.
+//! `halflight merge`: a picture from the films of all shards, or tables from bakes.
 
+use super::bake::tables;
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
 use super::summary;
 use super::view_args::ViewArgs;
 use clap::Args;
+use halflight::bake::{self, MergedBake};
 use halflight::render::{self, Merged};
 use halflight::report::{dropped_object, error_object, file_name, findings_object};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Merge the films of all shards of a picture
+/// Merge the films of all shards of a picture, or of a bake
 ///
-/// The films come from `halflight render --shard I/N --checkpoint FILE`, in any order. The picture has the
-/// bits of one render. Films of different scenes, settings or numbers of samples are refused.
+/// The films come from `halflight render --shard I/N --checkpoint FILE` or from `halflight bake` with these
+/// flags, in any order. Picture and tables have the bits of one render or bake. Films of different scenes,
+/// settings or numbers of samples are refused.
 #[derive(Args)]
 pub(super) struct Merge {
     /// Films, one of each shard
     #[arg(required = true)]
     films: Vec<PathBuf>,
-    /// Picture: .png, .exr, .hdr or .pfm; may be repeated
+    /// Picture: .png, .exr, .hdr or .pfm; table of a bake: .csv, .res or .ply; may be repeated
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -32,6 +35,9 @@ pub(super) struct Merge {
 
 impl Merge {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
+        if self.films.first().is_some_and(|film| bake::is_bake(film)) {
+            return self.run_bake();
+        }
         let mut outputs = Outputs::new(self.json);
         self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
         self.films.iter().try_for_each(|film| outputs.protect(film))?;
@@ -40,6 +46,38 @@ impl Merge {
         let saved = outputs.save_to(&self.output, &merged.image, &shown);
         let results =
             if self.json { self.object(&merged, &saved).to_string() } else { text(&merged, &saved) };
+        Ok(outputs.end(&results, ExitCode::SUCCESS))
+    }
+
+    /// Merges bakes.
+    fn run_bake(&self) -> Result<ExitCode, Failure> {
+        let mut outputs = Outputs::new(self.json);
+        let tables = tables(&self.output)?;
+        tables.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
+        self.films.iter().try_for_each(|film| outputs.protect(film))?;
+        let MergedBake { baked, sensors, quantity } = bake::merge(&self.films)?;
+        for (path, format) in &tables {
+            let table = (*format, quantity);
+            outputs.save_table(path, |out| {
+                bake::write_table(out, table, &sensors, (&baked.values, &baked.back_faces))
+            });
+        }
+        let spp = baked.values.iter().map(|value| value.samples).min().unwrap_or_default();
+        let results = match self.json {
+            true => json!({
+                "points": baked.values.len(),
+                "shards": self.films.len(),
+                "spp": spp,
+                "half_width": baked.median_half_width(),
+                "mean": baked.mean(),
+                "seconds": { "sampling": baked.seconds[1] },
+                "rays": baked.counters.all_rays(),
+                "paths": baked.counters.paths,
+                "outputs": self.output.iter().map(|file| file_name(file)).collect::<Value>(),
+            })
+            .to_string(),
+            false => format!("{} points, {spp} samples each", baked.values.len()),
+        };
         Ok(outputs.end(&results, ExitCode::SUCCESS))
     }
 

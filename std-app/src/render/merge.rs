@@ -1,8 +1,9 @@
 //! Merging of the shards of a picture, with the bits of a single render.
 
-use super::error::{FileError, RenderError};
+use super::error::RenderError;
 use super::files::{FilmHeader, FilmReader};
 use super::image::image;
+use super::merge_points::check_complete;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
 use super::threads::{Pool, Threads, Workers};
 use super::{Audited, ErrorEstimate, Method, NoiseAndBlur};
@@ -52,7 +53,8 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let films = files.iter().map(|file| FilmReader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
     let (Some(first), Some(name)) = (films.first(), files.first()) else { return Err(RenderError::Shard) };
     films.iter().try_for_each(|film| film.check_sibling(first))?;
-    check_shards(&films).map_err(|reason| FileError::new(reason).at(name))?;
+    let shards: Vec<Shard> = films.iter().map(|film| film.header.shard()).collect();
+    check_complete(&shards, name)?;
     let [width, height] = first.header.size();
     let spp = first.header.spp;
     let is_biased = first.header.method().is_some_and(Method::is_biased);
@@ -120,17 +122,4 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         findings: Findings::default().and(reconstruction.as_ref().map(FilmReconstruction::finding)),
         is_biased,
     })
-}
-
-/// The reason why `films` of one picture are not all of its shards.
-fn check_shards(films: &[FilmReader]) -> Result<(), String> {
-    let count = films.first().map_or(0, |first| first.header.shard().count);
-    for index in 0..count {
-        let found = films.iter().filter(|film| film.header.shard().index == index).count();
-        if found != 1 {
-            let how = if found == 0 { "missing" } else { "there more than once" };
-            return Err(format!("is one of {count} shards, of which shard {}/{count} is {how}", index + 1));
-        }
-    }
-    Ok(())
 }

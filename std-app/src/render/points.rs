@@ -3,17 +3,22 @@
 use super::back_faces::back_faces;
 use super::built::Built;
 use super::deadline::{Deadline, End};
+use super::files::{BakeHeader, BakeReader, Beside, Identity, RewrittenFile, write_bake};
 use super::memory::{Bank, Memory};
 use super::threads::{Pool, Threads, Workers};
-use super::{RenderError, Stop};
+use super::{Checkpoint, RenderError, Stop};
+use crate::file_error::FileError;
+use crate::save::Patience;
 use core::sync::atomic::AtomicBool;
 use halflight_core::findings::Findings;
 use halflight_core::memory::{Arena, Footprint};
+use halflight_core::method::Shard;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Counters, SceneContext};
 use halflight_core::{
     IrradiancePoint, IrradianceRenderer, Level, LightPart, PointIrradiance, PointSettings, Until,
 };
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Samples of the first round.
@@ -32,6 +37,14 @@ pub struct BakeSettings {
     pub light: LightPart,
     /// Caustic photons where a pilot finds that they pay.
     pub caustics: bool,
+    /// Part of the points to estimate, in tiles of 256 near points; the others have no samples.
+    pub shard: Shard,
+    /// Bake file to write.
+    pub checkpoint: Option<Checkpoint>,
+    /// Bytes that the file keeps for [`crate::bake::merge`].
+    pub attached: Vec<u8>,
+    /// Bake file to resume: a checkpoint of the same bake.
+    pub resume: Option<PathBuf>,
     /// Seed of all random numbers.
     pub seed: u32,
     /// Most segments of a path; 2 is direct light. `None`: no limit.
@@ -57,6 +70,10 @@ impl Default for BakeSettings {
             stop: Self::SENSIBLE,
             light: LightPart::All,
             caustics: true,
+            shard: Shard::WHOLE,
+            checkpoint: None,
+            attached: Vec::new(),
+            resume: None,
             seed: 0,
             max_depth: None,
             threads: None,
@@ -98,6 +115,8 @@ pub struct Baked {
     pub seconds: [f64; 2],
     /// True if the user ended the work.
     pub is_interrupted: bool,
+    /// Reason why the bake file is missing or out of date.
+    pub unsaved: Option<FileError>,
 }
 
 impl Baked {
@@ -118,6 +137,70 @@ impl Baked {
     }
 }
 
+impl BakeSettings {
+    /// The settings of the core.
+    fn of_core(&self) -> PointSettings {
+        let Self { seed, max_depth, level, light, caustics, shard, .. } = *self;
+        PointSettings { seed, max_depth, level, light, caustics, shard }
+    }
+}
+
+/// The bake file, written at intervals and at the end.
+struct Kept<'a> {
+    file: RewrittenFile<'a>,
+    settings: &'a BakeSettings,
+    identity: &'a Identity,
+    points: usize,
+    back_faces: &'a [f32],
+    /// Start of this run, and seconds of the earlier ones.
+    start: Instant,
+    before: f64,
+    /// Time of the last write.
+    saved: Instant,
+    interrupt: &'a AtomicBool,
+}
+
+impl<'a> Kept<'a> {
+    fn new(
+        settings: &'a BakeSettings,
+        (identity, points, back_faces): (&'a Identity, usize, &'a [f32]),
+        (start, before): (Instant, f64),
+        interrupt: &'a AtomicBool,
+    ) -> Self {
+        let path = settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path());
+        let file = RewrittenFile::in_file(path);
+        Self { file, settings, identity, points, back_faces, start, before, saved: Instant::now(), interrupt }
+    }
+
+    /// Writes the file if it is due.
+    fn update(&mut self, renderer: &IrradianceRenderer) {
+        let every = self.settings.checkpoint.as_ref().map(|checkpoint| checkpoint.every);
+        if every.is_some_and(|every| self.saved.elapsed().as_secs_f64() >= every) {
+            self.write(renderer, None);
+            self.saved = Instant::now();
+        }
+    }
+
+    /// Writes the file. Returns why it could not.
+    fn finish(mut self, renderer: &IrradianceRenderer) -> Option<FileError> {
+        let patience = Patience { since: Instant::now(), interrupt: self.interrupt };
+        self.write(renderer, Some(patience));
+        self.file.failed()
+    }
+
+    fn write(&mut self, renderer: &IrradianceRenderer, last: Option<Patience>) {
+        let beside = Beside { back_faces: self.back_faces, attached: &self.settings.attached };
+        let seconds = self.before + self.start.elapsed().as_secs_f64();
+        let header = || BakeHeader::new(self.identity, (self.points, beside), renderer, seconds);
+        let write =
+            |path: &Path, patience: Patience| write_bake(path, &header(), (renderer, beside), patience);
+        match last {
+            Some(patience) => self.file.finish(patience, write),
+            None => self.file.update(write),
+        }
+    }
+}
+
 /// Estimates the irradiance of `points` with the structures of `built`.
 pub(crate) fn with_points(
     (scene, built): (&Scene, &Built),
@@ -127,9 +210,14 @@ pub(crate) fn with_points(
     interrupt: &AtomicBool,
 ) -> Result<Baked, RenderError> {
     let start = Instant::now();
+    let core = settings.of_core();
+    let identity = BakeHeader::identity(scene, points, &core);
     let bank = Bank::new();
     let mut memory = Memory::of_scene(scene, settings.memory, &bank);
     built.count_in(&mut memory)?;
+    let open = |file: &PathBuf| BakeReader::open(file, memory.for_file());
+    let earlier = settings.resume.as_ref().map(open).transpose()?;
+    earlier.iter().try_for_each(|file| file.check(&identity, settings.shard))?;
     let given = Footprint::default().slice::<IrradiancePoint>(points.len()).slice::<f32>(points.len());
     memory.set_aside("given points", given)?;
     let mut lines = memory.take("points", IrradianceRenderer::footprint(scene, points.len()))?;
@@ -142,20 +230,15 @@ pub(crate) fn with_points(
     let end = End::Round(workers.deadline.after(0.5));
     back_faces(&context, points, &mut shares, &mut Threads::new(&workers, &mut scratch).until(end))?;
     let mut executor = Threads::new(&workers, &mut scratch).until(End::FirstRound(None));
-    let core = PointSettings {
-        seed: settings.seed,
-        max_depth: settings.max_depth,
-        level: settings.level,
-        light: settings.light,
-        caustics: settings.caustics,
-        ..PointSettings::default()
-    };
     let lights = built.lights.with_level(settings.level);
     let structures = (scene, built.bvh, lights);
     let mut arena = Arena::over(&mut lines);
     let mut renderer = IrradianceRenderer::over(structures, points, &core, &mut arena, &mut executor)?;
+    let before = earlier.as_ref().map_or(0.0, |file| file.header.seconds);
+    earlier.map_or(Ok(()), |file| file.resume(&mut renderer))?;
+    let mut kept = Kept::new(settings, (&identity, points.len(), &shares), (start, before), interrupt);
 
-    let mut target = FIRST_SAMPLES;
+    let mut target = FIRST_SAMPLES.max(renderer.samples());
     let mut is_first = true;
     loop {
         let most = settings.stop.most_samples();
@@ -173,6 +256,7 @@ pub(crate) fn with_points(
         let tiles = renderer.tiles();
         let seconds_left = settings.stop.seconds.map(|limit| (limit - seconds).max(0.0));
         progress(&BakeProgress { samples: renderer.samples(), tiles, seconds, seconds_left });
+        kept.update(&renderer);
         let is_exact = settings.stop.error.is_some() && tiles[0] == tiles[1];
         let is_full = most.is_some_and(|most| renderer.samples() >= most);
         let is_over = deadline.is_some_and(|deadline| Instant::now() >= deadline);
@@ -183,7 +267,9 @@ pub(crate) fn with_points(
         let growth = (LONGEST_ROUND / round.elapsed().as_secs_f64().max(1e-6)).clamp(0.125, 1.0);
         target = target.saturating_add((f64::from(target) * growth).ceil() as u32).min(1 << 30);
     }
+    let unsaved = kept.finish(&renderer);
     Ok(Baked {
+        unsaved,
         values: renderer.values().collect(),
         back_faces: shares,
         tiles: renderer.tiles(),

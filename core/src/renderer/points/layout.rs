@@ -28,12 +28,22 @@ impl Layout {
         self.pixels().div_ceil(PIXELS_PER_TILE)
     }
 
+    /// Pixels of the film across and down.
+    pub(super) fn size(&self) -> [u32; 2] {
+        [TILE, TILE * self.tiles() as u32]
+    }
+
+    /// Memory of sums and half-widths.
+    pub(super) fn of_film(&self) -> Footprint {
+        let [width, height] = self.size();
+        RenderState::footprint(width, height).slice::<f32>(self.pixels())
+    }
+
     pub(super) fn footprint(&self) -> Footprint {
-        let film = RenderState::footprint(TILE, TILE * self.tiles() as u32);
-        film.slice::<IrradiancePoint>(self.pixels())
+        self.of_film()
+            .slice::<IrradiancePoint>(self.pixels())
             .slice::<u64>(self.pixels())
             .slice::<u32>(self.pixels())
-            .slice::<f32>(self.pixels())
             .slice::<u8>(self.tiles())
     }
 }

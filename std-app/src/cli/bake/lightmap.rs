@@ -17,7 +17,7 @@ use std::process::ExitCode;
 const PADDING: u32 = 4;
 
 /// Subjects of other runs. clap drops a requirement that conflicts with another flag.
-const OTHERS: [&str; 3] = ["points", "vertices", "probes"];
+const OTHERS: [&str; 6] = ["points", "vertices", "probes", "checkpoint", "resume", "shard"];
 
 #[derive(Args)]
 pub(super) struct LightmapArgs {
@@ -72,7 +72,11 @@ impl LightmapArgs {
             Failure::new(format!("{}: {error}", bake.scene.display())).advice(error.advice())
         })?;
         lightmap.notes.iter().for_each(print_note);
-        let baked = bake.bake(&loaded, lightmap.points(), Some(memory.limit() + memory.left() - before))?;
+        let baked = bake.bake(
+            &loaded,
+            lightmap.points(),
+            (Some(memory.limit() + memory.left() - before), Vec::new()),
+        )?;
         let map = lightmap.map(&baked, bake.quantity());
         maps.iter().for_each(|(path, format)| save(&mut outputs, path, map.encode(*format)));
         error_map.iter().for_each(|(path, format)| save(&mut outputs, path, map.encode_error(*format)));

@@ -15,7 +15,7 @@ use std::process::ExitCode;
 pub(super) struct ProbeArgs {
     /// Light probes at the centres of so many cells along x, y and z
     #[arg(long, value_name = "NXxNYxNZ", value_parser = values::grid,
-          conflicts_with_all = ["points", "vertices", "lightmap", "unit"])]
+          conflicts_with_all = ["points", "vertices", "lightmap", "unit", "checkpoint", "resume", "shard"])]
     probes: Option<[u32; 3]>,
     /// Box of the cells of probes in the coordinates of the files [default: that of the scene]
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds,
@@ -49,7 +49,8 @@ impl ProbeArgs {
             Failure::new(format!("{}: too many probes: {why}", bake.scene.display()))
                 .advice("lower --probes, or raise --memory")
         })?;
-        let baked = bake.bake(&loaded, grid.points(), Some(memory.limit() + memory.left() - before))?;
+        let baked =
+            bake.bake(&loaded, grid.points(), (Some(memory.limit() + memory.left() - before), Vec::new()))?;
         let probes = grid.probes(&baked);
         for (path, format) in &files {
             outputs.save_table(path, |out| write_probes(out, *format, &grid, &probes));

@@ -11,6 +11,7 @@ use halflight_core::film::{Dropped, PIXELS_PER_TILE, TILE, Tile};
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::reconstruction::PixelSurfaces;
 use halflight_core::transport::Counters;
+use std::io;
 use std::path::Path;
 
 const KIND: Kind = Kind { magic: *b"HLFILM", version: 10, name: "film" };
@@ -24,21 +25,61 @@ pub(in crate::render) fn write(
     patience: Patience,
 ) -> Result<(), FileError> {
     container::write(path, &KIND, header, patience, |file| {
-        file.put(bytemuck::bytes_of(&state.counters))?;
-        file.put_list(state.dropped)?;
-        file.put_list(state.samples)?;
-        // Tiles without samples are not stored.
-        let tiles = state.film.pixels().chunks(PIXELS_PER_TILE).enumerate();
-        for (task, pixels) in tiles.filter(|(task, _)| state.samples[*task] > 0) {
-            file.put(bytemuck::cast_slice(pixels))?;
-            if let Some(surfaces) = surfaces {
+        put_state(file, state, |file, task| match surfaces {
+            Some(surfaces) => {
                 let of_tile: Vec<_> =
                     rows(header.size(), task).flat_map(|row| &surfaces[row]).copied().collect();
-                file.put(bytemuck::cast_slice(&of_tile))?;
+                file.put(bytemuck::cast_slice(&of_tile))
             }
-        }
-        Ok(())
+            None => Ok(()),
+        })
     })
+}
+
+/// Writes counters, rejected samples and tiles with samples, each with what `beside` adds to it.
+pub(super) fn put_state(
+    file: &mut container::Writer,
+    state: &RenderState,
+    mut beside: impl FnMut(&mut container::Writer, usize) -> io::Result<()>,
+) -> io::Result<()> {
+    file.put(bytemuck::bytes_of(&state.counters))?;
+    file.put_list(state.dropped)?;
+    file.put_list(state.samples)?;
+    let tiles = state.film.pixels().chunks(PIXELS_PER_TILE).enumerate();
+    for (task, pixels) in tiles.filter(|(task, _)| state.samples[*task] > 0) {
+        file.put(bytemuck::cast_slice(pixels))?;
+        beside(file, task)?;
+    }
+    Ok(())
+}
+
+/// Adds what [`put_state`] has written of `shard` to `state`, a film of the same size; `beside` reads what
+/// belongs to a tile beside its pixels.
+pub(super) fn get_state(
+    file: &mut container::Reader,
+    shard: Shard,
+    state: &mut RenderState,
+    mut beside: impl FnMut(&mut container::Reader, usize) -> Result<(), FileError>,
+) -> Result<(), FileError> {
+    let tiles = state.samples.len();
+    let mut counters = Counters::default();
+    file.get(bytemuck::bytes_of_mut(&mut counters))?;
+    let dropped: Vec<Dropped> = file.get_list(tiles)?;
+    let taken: Vec<u32> = file.get_list(tiles)?;
+    for (task, pixels) in state.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
+        if taken[task] == 0 {
+            continue;
+        }
+        if !shard.owns(task) {
+            return Err(file.damage("it has tiles of other shards"));
+        }
+        file.get(bytemuck::cast_slice_mut(pixels))?;
+        beside(file, task)?;
+        state.samples[task] = taken[task];
+    }
+    state.counters += counters;
+    state.dropped.iter_mut().zip(dropped).for_each(|(sum, dropped)| *sum += dropped);
+    Ok(())
 }
 
 /// Pixels of a tile in a picture that is stored row by row.
@@ -111,36 +152,23 @@ impl Reader {
         if tiles != state.samples.len() {
             return Err(self.file.damage("it has another size than it says"));
         }
-        let mut counters = Counters::default();
-        self.file.get(bytemuck::bytes_of_mut(&mut counters))?;
-        let dropped: Vec<Dropped> = self.file.get_list(tiles)?;
-        let taken: Vec<u32> = self.file.get_list(tiles)?;
-        let shard = self.header.shard();
-        for (task, pixels) in state.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
-            if taken[task] == 0 {
-                continue;
+        let has_surfaces = self.header.has_surfaces;
+        get_state(&mut self.file, self.header.shard(), state, |file, task| {
+            if !has_surfaces {
+                return Ok(());
             }
-            if !shard.owns(task) {
-                return Err(self.file.damage("it has tiles of other shards"));
+            let count = rows([width, height], task).map(|row| row.len()).sum();
+            let mut of_tile = vec![PixelSurfaces::default(); count];
+            file.get(bytemuck::cast_slice_mut(&mut of_tile))?;
+            if !of_tile.iter().all(PixelSurfaces::is_finite) {
+                return Err(file.damage("it has surfaces that are not numbers"));
             }
-            self.file.get(bytemuck::cast_slice_mut(pixels))?;
-            if self.header.has_surfaces {
-                let count = rows([width, height], task).map(|row| row.len()).sum();
-                let mut of_tile = vec![PixelSurfaces::default(); count];
-                self.file.get(bytemuck::cast_slice_mut(&mut of_tile))?;
-                if !of_tile.iter().all(PixelSurfaces::is_finite) {
-                    return Err(self.file.damage("it has surfaces that are not numbers"));
-                }
-                if let Some(surfaces) = &mut surfaces {
-                    let places = rows([width, height], task).flatten();
-                    places.zip(of_tile).for_each(|(place, found)| surfaces[place] = found);
-                }
+            if let Some(surfaces) = &mut surfaces {
+                let places = rows([width, height], task).flatten();
+                places.zip(of_tile).for_each(|(place, found)| surfaces[place] = found);
             }
-            state.samples[task] = taken[task];
-        }
-        self.file.finish()?;
-        state.counters += counters;
-        state.dropped.iter_mut().zip(dropped).for_each(|(sum, dropped)| *sum += dropped);
-        Ok(())
+            Ok(())
+        })?;
+        self.file.finish()
     }
 }

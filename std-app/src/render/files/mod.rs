@@ -1,6 +1,7 @@
 //! Files of films and caches: one container, one identity of their scene and settings
 //! (docs/file-container.md).
 
+mod bake;
 mod cache;
 mod cache_header;
 mod container;
@@ -10,6 +11,8 @@ mod hash;
 mod identity;
 mod rewritten;
 
+pub use bake::is_bake;
+pub(super) use bake::{BakeHeader, Beside, Reader as BakeReader, Tables, write as write_bake};
 pub use cache::inspect as inspect_cache;
 pub(super) use cache::{Loaded, open as open_cache, write as write_cache};
 pub(super) use cache_header::{CacheHeader, Half, View};
