@@ -13,8 +13,8 @@ use crate::scene::Scene;
 use crate::transport::path::WAVE;
 use crate::transport::{IrradiancePoint, LightEstimator, LightPart, PathIntegrator};
 
-/// Receivers that the photon maps of few points suffice for.
-const FEWEST_RECEIVERS: usize = 1 << 15;
+/// Receivers whose photon maps have room for the fewest light paths of a map.
+const FEWEST_RECEIVERS: usize = 36 << 10;
 
 /// Irradiance at the points of one scene. Pixel `i` of the film is point `i`.
 pub struct IrradiancePoints<'a, F> {

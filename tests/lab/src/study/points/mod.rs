@@ -50,7 +50,7 @@ pub(super) struct Points {
     threads: Option<usize>,
 }
 
-fn multiple(text: &str) -> std::result::Result<u32, String> {
+fn multiple(text: &str) -> core::result::Result<u32, String> {
     match text.parse::<u32>() {
         Ok(samples) if samples > 0 && samples.is_multiple_of(REPLICATES) => Ok(samples),
         _ => Err(format!("a number of samples is a multiple of {REPLICATES}")),
