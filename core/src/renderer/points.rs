@@ -208,7 +208,7 @@ impl<'a> IrradianceRenderer<'a> {
         &self.film.state
     }
 
-    /// The film, which is its own without a scene.
+    /// The film.
     #[doc(hidden)]
     pub fn film(&self) -> &PointFilm<'a> {
         &self.film

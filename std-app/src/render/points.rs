@@ -189,6 +189,10 @@ impl<'a> Kept<'a> {
     }
 
     fn write(&mut self, renderer: &IrradianceRenderer, last: Option<Patience>) {
+        // An end before the points were put into order leaves the file as it was.
+        if renderer.film().points.is_empty() {
+            return;
+        }
         let beside = Beside { back_faces: self.back_faces, attached: &self.settings.attached };
         let seconds = self.before + self.start.elapsed().as_secs_f64();
         let header = || BakeHeader::new(self.identity, (self.points, beside), renderer, seconds);
