@@ -262,7 +262,8 @@ pub(crate) fn with_points(
         progress(&BakeProgress { samples: renderer.samples(), tiles, seconds, seconds_left });
         kept.update(&renderer);
         let is_exact = settings.stop.error.is_some() && tiles[0] == tiles[1];
-        let is_full = most.is_some_and(|most| renderer.samples() >= most);
+        // Tiles within the error have fewer.
+        let is_full = most.is_some_and(|most| target >= most);
         let is_over = deadline.is_some_and(|deadline| Instant::now() >= deadline);
         if is_exact || is_full || is_over || workers.deadline.is_interrupted() {
             break;
