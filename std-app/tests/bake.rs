@@ -103,7 +103,7 @@ fn shards_of_a_bake_merge_to_the_bits_of_one() {
 fn a_bake_goes_on_from_its_file_with_the_same_bits() {
     let folder = Folder::new("bake-resumed");
     write_grid(&folder);
-    let bake = "bake scene.obj --points grid.pts --error 0.025";
+    let bake = "bake scene.obj --points grid.pts --error 0.008";
     folder.object(&format!("{bake} -o whole.csv --json"));
     let table = |name: &str| std::fs::read(folder.path(name)).unwrap();
     // Ended between decisions, at a decision, and before the first one.
