@@ -56,9 +56,6 @@ pub(super) const LEAST_GAIN_OF_LOBES: f64 = 1.1;
 /// help, and promises up to 10 (ablation.md).
 pub(super) const REUSE_GAIN: f64 = 2.5;
 
-/// Gain of a reconstruction of paths: 1.8 to 37 in eleven scenes (reconstruction.md).
-pub(super) const RECONSTRUCTION_GAIN: f64 = 3.0;
-
 /// Factor on the predicted error of light paths: their rays take more time (choice-of-method.md).
 pub(super) const LIGHT_PATHS_ERROR: f64 = 2.0;
 

@@ -2,7 +2,7 @@
 
 use super::reconstructing;
 use super::rounds::{Estimates, Rounds, Stop};
-use super::{Reconstruct, RenderError, RequiredMemory, Settings, Until};
+use super::{RenderError, RequiredMemory, Settings, Until};
 use crate::audit::{Audit, AuditSettings, ErrorReport, ExtraTime, MethodAtWork, Spent, audit_fraction};
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
@@ -119,7 +119,6 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             kept: KeptCaches::default(),
             widens: true,
             has_fixed_records: false,
-            is_reconstructed: settings.reconstruct == Reconstruct::Auto,
             lacks_memory: false,
         };
         let mut plan = settings.method.kind().map_or_else(MethodPlan::open, MethodPlan::from);

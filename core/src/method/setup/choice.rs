@@ -10,7 +10,6 @@ use crate::method::bidirectional::BidirectionalSettings;
 use crate::method::caustics::CausticPathTracing;
 use crate::method::choice::{MethodPilot, Trial, TrialCaches};
 use crate::method::sppm::ProgressivePhotonMapping;
-use crate::method::tuned::RECONSTRUCTION_GAIN;
 use crate::method::{Executor, RenderMethod, caustics, counts};
 use crate::transport::PathSettings;
 
@@ -37,9 +36,6 @@ pub(super) fn choose<'a: 'm, 'm, F: Features>(
     let resolution = (!setup.has_open_cache()).then(|| options.cache.resolution());
     let caches = TrialCaches { resolution, shards: setup.shards, lobes: options.lobes };
     let Some(trial) = Trial::run(context, paths, &caches, memory, executor)? else { return Ok(None) };
-    // Only pictures by paths are reconstructed.
-    let gain = if setup.is_reconstructed { RECONSTRUCTION_GAIN } else { 1.0 };
-    let trial = Trial { reuse: trial.reuse / gain, ..trial };
     // Photons of paths and caches have the light of merges, and no blur that lasts as long as the picture.
     let merging = options.bidirectional.merging.or(Some(false));
     let techniques = BidirectionalSettings { merging, ..options.bidirectional };

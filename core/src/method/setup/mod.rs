@@ -45,8 +45,6 @@ pub struct MethodSetup<'a, 's> {
     pub widens: bool,
     /// True if gather rays and density of records are those of the options, since files hold the records.
     pub has_fixed_records: bool,
-    /// True if pictures by path tracing are reconstructed.
-    pub is_reconstructed: bool,
     /// True if there is no room for the working memory of caustic photons.
     pub lacks_memory: bool,
 }

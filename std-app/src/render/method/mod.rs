@@ -13,7 +13,7 @@ use super::memory::Memory;
 use super::setup::RenderSetup;
 use super::survey::Survey;
 use super::threads::{ThreadedRound, Threads};
-use super::{Method, Reconstruct, RenderError, hidden_light};
+use super::{Method, RenderError, hidden_light};
 use crate::save::Patience;
 use cache_keeper::{CacheKeeper, LoadedCaches};
 use halflight_core::audit::{AuditedMethod, Borrower, audit_fraction};
@@ -96,7 +96,6 @@ fn of_core<'a, 's, F: Features>(setup: &RenderSetup<'a>, kept: KeptCaches<'s>) -
         kept,
         widens: !keeps_records,
         has_fixed_records: settings.load_cache.is_some() || keeps_records,
-        is_reconstructed: settings.reconstruct == Reconstruct::Auto,
         lacks_memory: false,
     }
 }
