@@ -117,7 +117,7 @@ impl ErrorReport {
         }
         // All pixels know the bias of the reconstruction better than the few of an audit do.
         if let (Some(audited), Some(error)) = (&mut audited, self.reconstructed) {
-            audited.total = audited.total.max(error.total);
+            audited.total = audited.total.larger(error.total);
         }
         Self { noise: self.noise, audited, noise_and_blur, ..self }
     }

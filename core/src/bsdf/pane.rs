@@ -4,7 +4,7 @@
 //! With r the Fresnel reflectance of a face and τ the transmittance of the body along the refracted ray, the
 //! geometric series of the reflections inside gives
 //!
-//!     R = r + r (1 - r)² τ² / (1 - r² τ²),     T = (1 - r)² τ / (1 - r² τ²).
+//! R = r + r (1 - r)² τ² / (1 - r² τ²), T = (1 - r)² τ / (1 - r² τ²).
 //!
 //! Straight on, a ray skips the pane as a cut-out of opacity 1 - max T, so that light samples pass it too;
 //! else it is mirrored. Clear and grey panes change no throughput where rays pass.

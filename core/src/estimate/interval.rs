@@ -58,7 +58,7 @@ const LEAST_SEEN: f64 = 0.01;
 
 impl ErrorEstimate {
     /// The larger of two estimates of which each has parts that the other lacks.
-    pub fn max(self, other: Self) -> Self {
+    pub(crate) fn larger(self, other: Self) -> Self {
         Self {
             relmse: self.relmse.max(other.relmse),
             lower: self.lower.max(other.lower),

@@ -3,13 +3,19 @@
 use super::{Reconstruct, RenderError, Settings};
 use crate::bsdf::Features;
 use crate::memory::{Arena, Footprint};
-use crate::method::{Executor, RenderContext};
+use crate::method::{Executor, MethodKind, RenderContext, Shard};
 use crate::reconstruction::{FilmReconstruction, FirstSurfaces};
 use crate::scene::Scene;
 
+/// True if pictures are to be reconstructed: of methods that share nothing between pixels, and whole ones.
+fn is_wanted(settings: &Settings) -> bool {
+    let shares = settings.method.kind().is_some_and(MethodKind::shares);
+    settings.reconstruct == Reconstruct::Auto && !shares && settings.shard == Shard::WHOLE
+}
+
 /// Memory that stays taken, and memory for the search of surfaces before other structures are made.
 pub(super) fn footprints<F: Features>(scene: &Scene, settings: &Settings) -> [Footprint; 2] {
-    if settings.reconstruct == Reconstruct::Off {
+    if !is_wanted(settings) {
         return Default::default();
     }
     FilmReconstruction::footprints_of_view::<F>(&scene.mesh, settings.size)
@@ -17,10 +23,7 @@ pub(super) fn footprints<F: Features>(scene: &Scene, settings: &Settings) -> [Fo
 
 /// Working memory of a worker for the search of surfaces.
 pub(super) fn scratch<F: Features>(settings: &Settings) -> Footprint {
-    match settings.reconstruct {
-        Reconstruct::Auto => FirstSurfaces::<F>::scratch(),
-        Reconstruct::Off => Footprint::default(),
-    }
+    if is_wanted(settings) { FirstSurfaces::<F>::scratch() } else { Footprint::default() }
 }
 
 /// Reconstruction of a picture, if it is wanted; `None` also if the executor is over.
@@ -30,8 +33,8 @@ pub(super) fn set_up<'a, F: Features>(
     arena: &mut Arena<'a>,
     executor: &mut impl Executor,
 ) -> Result<Option<FilmReconstruction<'a>>, RenderError> {
-    match settings.reconstruct {
-        Reconstruct::Auto => Ok(FilmReconstruction::of_view::<F>(context, arena, executor)?),
-        Reconstruct::Off => Ok(None),
+    match is_wanted(settings) {
+        true => Ok(FilmReconstruction::of_view::<F>(context, arena, executor)?),
+        false => Ok(None),
     }
 }

@@ -114,11 +114,8 @@ impl Reader {
 
     /// Refuses a film of another identity or shard.
     pub(in crate::render) fn check(&self, identity: &Identity, shard: Shard) -> Result<(), FileError> {
-        let words = |shard: Shard| format!("shard {}/{}", shard.index + 1, shard.count);
-        let own = self.header.shard();
-        let difference = self.header.identity.difference(identity);
-        let difference =
-            difference.or((own != shard).then(|| format!("of {}, not of {}", words(own), words(shard))));
+        let own = (&self.header.identity, self.header.shard());
+        let difference = Identity::difference_of_shards(own, (identity, shard));
         difference.map_or(Ok(()), |difference| Err(self.file.refusal(format!("is a film {difference}"))))
     }
 

@@ -2,6 +2,7 @@
 //! its scene are fingerprints of 64 bits in hexadecimal.
 
 use super::hash::Hash;
+use halflight_core::method::Shard;
 use halflight_core::scene::{Scene, Texels};
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +60,13 @@ impl Identity {
         let parts = differing().map(|((name, _), _)| name.as_str()).filter(|name| is_part(name));
         let parts: Vec<&str> = parts.collect();
         Some(format!("of another scene, or its {} changed since", parts.join(" and ")))
+    }
+
+    /// First difference between a file of this identity and shard and another, in words.
+    pub(super) fn difference_of_shards(own: (&Self, Shard), other: (&Self, Shard)) -> Option<String> {
+        let words = |shard: Shard| format!("shard {}/{}", shard.index + 1, shard.count);
+        let shards = || format!("of {}, not of {}", words(own.1), words(other.1));
+        own.0.difference(other.0).or_else(|| (own.1 != other.1).then(shards))
     }
 }
 
