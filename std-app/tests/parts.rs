@@ -117,7 +117,7 @@ fn a_merged_picture_knows_what_its_samples_share() {
         |scene: &str, method: &str| format!("render {scene} --size 64x64 --spp 8 --method {method} --json");
     let cases = [
         (caustic.to_str().unwrap(), "path", false, "noise and blur of photons"),
-        ("scene.obj", "path", false, "noise alone"),
+        ("scene.obj", "path", false, "noise and bias of the reconstruction"),
         ("scene.obj", "sppm", true, "noise alone; bias is not included"),
     ];
     for (scene, method, biased, words) in cases {

@@ -108,7 +108,11 @@ fn text(merged: &Merged, saved: &[&PathBuf]) -> String {
     lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
     match &merged.audit {
         Some(audit) => lines.extend(summary::audited(audit)),
-        None => lines.extend(summary::estimate(merged.error, merged.noise_and_blur, merged.is_biased)),
+        None => lines.extend(summary::estimate(
+            merged.error,
+            merged.noise_and_blur,
+            (merged.is_biased, &merged.findings),
+        )),
     }
     lines.extend(merged.findings.iter().map(|finding| format!("       {}", summary::finding(finding))));
     lines.extend(summary::rejected(&merged.counters, &merged.rejected_tiles, merged.empty_pixels));

@@ -4,7 +4,7 @@ use super::compare as comparing;
 use halflight::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
 use halflight::render::{Audited, BiasEstimate, Ending, ErrorEstimate, NoiseAndBlur, RejectedTile, StopRule};
 use halflight::report::Run;
-use halflight_core::findings::{Finding, Value};
+use halflight_core::findings::{Decision, Finding, Findings, Value};
 use halflight_core::transport::Counters;
 use std::path::Path;
 
@@ -17,7 +17,11 @@ pub(super) fn text(run: &Run, report: Option<&Path>, by_default: bool) -> String
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
     match &result.audit {
-        None => lines.extend(estimate(result.error, result.noise_and_blur, result.method.is_biased())),
+        None => lines.extend(estimate(
+            result.error,
+            result.noise_and_blur,
+            (result.method.is_biased(), &result.findings),
+        )),
         Some(audit) => {
             lines.extend(audited(audit));
             let doubt = run.doubt().filter(|_| audit.is_biased());
@@ -132,7 +136,7 @@ pub(super) fn audited(audit: &Audited) -> Vec<String> {
 pub(super) fn estimate(
     estimate: Option<ErrorEstimate>,
     noise_and_blur: Option<NoiseAndBlur>,
-    is_biased: bool,
+    (is_biased, findings): (bool, &Findings),
 ) -> Vec<String> {
     let Some(estimate) = estimate else {
         return vec!["error  unknown: the estimate needs four samples per pixel and some light".into()];
@@ -142,6 +146,9 @@ pub(super) fn estimate(
     match noise_and_blur {
         Some(NoiseAndBlur { noise, blur, .. }) => {
             vec![format!("{error}, noise and blur of photons{bias}"), parts(&noise, "blur", &blur)]
+        }
+        None if findings.get("reconstruction").is_some_and(|made| made.decision == Decision::Used) => {
+            vec![format!("{error}, noise and bias of the reconstruction{bias}")]
         }
         None => vec![format!("{error}, noise alone{}", bias.replace("other bias", "bias"))],
     }
