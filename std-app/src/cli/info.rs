@@ -8,10 +8,12 @@ use clap::Args;
 use halflight::load::{self, LoadOptions, LoadedScene, NamedCamera};
 use halflight::quantity::{readable_bytes, readable_name};
 use halflight::report::{counts, left_out_array};
+use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::{Census, Plan};
 use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
+use halflight_core::reconstruction::FilmReconstruction;
 use halflight_core::scene::Camera;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -39,12 +41,14 @@ impl Info {
         let scene = views.scene(self.camera.camera(&loaded)?);
         let census = Census::of(&scene);
         let [width, height] = self.size.or(loaded.settings.size.map(<[u32; 2]>::from)).unwrap_or([512, 512]);
+        let [kept, search] = FilmReconstruction::footprints_of_view::<All>(&scene.mesh, [width, height]);
         let facts = Facts {
             footprints: [
                 ("bvh", Bvh::kept_footprint(scene.mesh.triangles.len()).bytes()),
                 ("bvh_build", Bvh::footprint(scene.mesh.triangles.len()).bytes()),
                 ("lights", LightSampler::footprint(&scene).bytes()),
                 ("film", Film::footprint(width, height).bytes()),
+                ("reconstruction", kept.or(search).bytes()),
             ],
             plan: census.plan(),
             camera: CameraFacts::new(&scene.camera, &loaded),
@@ -81,7 +85,7 @@ struct Facts<'a> {
     camera: CameraFacts,
     counts: Vec<(&'static str, u64)>,
     plan: Plan,
-    footprints: [(&'static str, usize); 4],
+    footprints: [(&'static str, usize); 5],
 }
 
 impl Facts<'_> {
