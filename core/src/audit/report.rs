@@ -34,6 +34,22 @@ impl ErrorReport {
         audit: Option<&mut Audit<F>>,
         executor: &mut E,
     ) -> Self {
+        let judge = |mean, noise, made: Option<&FilmReconstruction>, executor: &mut E| {
+            let audit = audit?;
+            audit.compare(&state.film, made, mean, executor);
+            audit.verdict(noise)
+        };
+        Self::judged_by(state, reconstruction, judge, executor)
+    }
+
+    /// Report of a picture, or of its `reconstruction`, which is made anew. `audit` judges it by its mean,
+    /// its noise and that reconstruction.
+    pub fn judged_by<E: Executor>(
+        state: &RenderState,
+        reconstruction: Option<&mut FilmReconstruction>,
+        audit: impl FnOnce(f64, ErrorEstimate, Option<&FilmReconstruction>, &mut E) -> Option<Audited>,
+        executor: &mut E,
+    ) -> Self {
         let film = &state.film;
         let mean = film.mean_radiance(executor);
         let noise = mean.and_then(|mean| ErrorEstimate::of_film(film, mean, state.is_correlated, executor));
@@ -46,11 +62,7 @@ impl ErrorReport {
         });
         let Some(mean) = mean else { return Self::default() };
         let reconstructed = reconstruction.and_then(FilmReconstruction::error);
-        let judge = |mean, noise, executor: &mut E| {
-            let audit = audit?;
-            audit.compare(film, reconstruction, mean, executor);
-            audit.verdict(noise)
-        };
+        let judge = |mean, noise, executor: &mut E| audit(mean, noise, reconstruction, executor);
         Self { noise, reconstructed, ..Self::default() }.audited_by(film, mean, judge, executor)
     }
 

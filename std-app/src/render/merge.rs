@@ -91,23 +91,14 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let pool = Pool::new(None)?;
     let report = Workers::new(&pool).estimating(|executor| {
         let film = &state.film;
-        if let Some(made) = &mut reconstruction {
-            let noise = |mean, executor: &mut Threads| {
-                ErrorEstimate::of_film(film, mean, state.is_correlated, executor)
-            };
-            let noise = film.mean_radiance(executor).and_then(|mean| noise(mean, executor));
-            made.update(film, noise, executor);
-        }
-        let made = reconstruction.as_ref();
-        let judge = |mean: f64, noise: ErrorEstimate, executor: &mut Threads| {
+        let judge = |mean, noise, made: Option<&FilmReconstruction>, executor: &mut Threads| {
             let merged = AuditedPixels::merged(&audits?, film, mean, &mut Arena::over(&mut audited));
             // The memory is of the stated size.
             let mut merged = merged.ok()??;
             merged.compare(film, made, mean, executor);
             merged.verdict(noise)
         };
-        let error = made.and_then(FilmReconstruction::error);
-        ErrorReport::of_film(film, (state.is_correlated, error), judge, executor)
+        ErrorReport::judged_by(&state, reconstruction.as_mut(), judge, executor)
     });
     Ok(Merged {
         image: image(&state.film, reconstruction.as_ref()),
