@@ -159,15 +159,10 @@ impl Reader {
 
     /// Refuses a bake that cannot be merged with `first`.
     pub(in crate::render) fn check_sibling(&self, first: &Self) -> Result<(), FileError> {
-        let (own, other) = (&self.header, &first.header);
-        let counts = [own.shard().count, other.shard().count];
-        let why = match own.identity.difference(&other.identity) {
-            Some(difference) => format!("a bake {difference}"),
-            None if counts[0] != counts[1] => format!("one of {} shards, not of {}", counts[0], counts[1]),
-            None if own.spp != other.spp => format!("a bake of {} samples, not of {}", own.spp, other.spp),
-            None => return Ok(()),
-        };
-        Err(self.file.refusal(format!("does not belong to {}: it is {why}", first.file.path().display())))
+        let of = |bake: &Self| (bake.header.shard().count, bake.header.spp);
+        let others = (&first.header.identity, of(first), first.file.path());
+        let difference = self.header.identity.difference_of_siblings("bake", of(self), others);
+        difference.map_or(Ok(()), |difference| Err(self.file.refusal(difference)))
     }
 
     /// Continues the bake in `renderer`, which has the same points.

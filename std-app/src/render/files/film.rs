@@ -121,21 +121,10 @@ impl Reader {
 
     /// Refuses a film that cannot be merged with `first`.
     pub(in crate::render) fn check_sibling(&self, first: &Self) -> Result<(), FileError> {
-        let (own, other) = (&self.header, &first.header);
-        let refuse = |why: String| {
-            let first = first.file.path().display();
-            Err(self.file.refusal(format!("does not belong to {first}: it is {why}")))
-        };
-        if let Some(difference) = own.identity.difference(&other.identity) {
-            return refuse(format!("a film {difference}"));
-        }
-        if own.shard().count != other.shard().count {
-            return refuse(format!("one of {} shards, not of {}", own.shard().count, other.shard().count));
-        }
-        if own.spp != other.spp {
-            return refuse(format!("a film of {} samples, not of {}", own.spp, other.spp));
-        }
-        Ok(())
+        let of = |film: &Self| (film.header.shard().count, film.header.spp);
+        let others = (&first.header.identity, of(first), first.file.path());
+        let difference = self.header.identity.difference_of_siblings("film", of(self), others);
+        difference.map_or(Ok(()), |difference| Err(self.file.refusal(difference)))
     }
 
     /// Reads the stored tiles into `state`, a film of the same size, and their `surfaces` into a picture.

@@ -5,6 +5,7 @@ use super::hash::Hash;
 use halflight_core::method::Shard;
 use halflight_core::scene::{Scene, Texels};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Adds a part of a scene to a hash.
 type Put = fn(&Scene, &mut Hash);
@@ -60,6 +61,23 @@ impl Identity {
         let parts = differing().map(|((name, _), _)| name.as_str()).filter(|name| is_part(name));
         let parts: Vec<&str> = parts.collect();
         Some(format!("of another scene, or its {} changed since", parts.join(" and ")))
+    }
+
+    /// The reason why a file, a `kind` of this identity with a number of shards and samples, is not to be
+    /// merged with another at a path.
+    pub(super) fn difference_of_siblings(
+        &self,
+        kind: &str,
+        (count, spp): (u32, u32),
+        (identity, (first_count, first_spp), first): (&Self, (u32, u32), &Path),
+    ) -> Option<String> {
+        let difference = match self.difference(identity) {
+            Some(difference) => format!("a {kind} {difference}"),
+            None if count != first_count => format!("one of {count} shards, not of {first_count}"),
+            None if spp != first_spp => format!("a {kind} of {spp} samples, not of {first_spp}"),
+            None => return None,
+        };
+        Some(format!("does not belong to {}: it is {difference}", first.display()))
     }
 
     /// First difference between a file of this identity and shard and another, in words.
