@@ -1,10 +1,8 @@
 //! Texels of a lightmap and their files: EXR with coverage, HDR, PFM.
 
-use crate::save::{self, FileError, Format, Image};
-use exr::image::{Blocks, Encoding, SpecificChannels};
+use crate::save::{self, EXR, FileError, Format, Image, exr_bytes};
+use exr::image::SpecificChannels;
 use exr::math::Vec2;
-use exr::prelude::{Compression, LineOrder, WritableImage};
-use std::io::Cursor;
 
 /// Values of a texel in all layers; the first alone, or the constant and the gradient along x, y and z.
 pub(super) type Fetch = [[f32; 3]; 4];
@@ -122,16 +120,7 @@ impl LightMap {
             };
             (r, g, b, coverage)
         };
-        let (compression, blocks) = (Compression::ZIP16, Blocks::ScanLines);
-        let encoding = Encoding { compression, blocks, line_order: LineOrder::Increasing };
-        let mut bytes = Vec::new();
-        exr::image::Image::from_encoded_channels(size, encoding, SpecificChannels::rgba(pixel))
-            .write()
-            // In parallel `exr` starts threads of its own.
-            .non_parallel()
-            .to_buffered(Cursor::new(&mut bytes))
-            .map_err(FileError::new)?;
-        Ok(bytes)
+        exr_bytes(&exr::image::Image::from_encoded_channels(size, EXR, SpecificChannels::rgba(pixel)))
     }
 }
 

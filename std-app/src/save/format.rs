@@ -2,6 +2,7 @@
 
 use super::{Image, display_byte};
 use crate::picture::{FileError, MAX_PIXELS, fail};
+use exr::image::write::layers::WritableLayers;
 use exr::image::{Blocks, Encoding, SpecificChannels};
 use exr::math::Vec2;
 use exr::prelude::{Compression, LineOrder, WritableImage};
@@ -84,10 +85,22 @@ fn encode_png(picture: &Image) -> Result<Vec<u8>, FileError> {
 fn encode_exr(picture: &Image) -> Result<Vec<u8>, FileError> {
     let size = Vec2(picture.width as usize, picture.height as usize);
     let pixel = |at: Vec2<usize>| <(f32, f32, f32)>::from(picture.pixels[at.y() * size.x() + at.x()]);
-    let (compression, blocks, line_order) = (Compression::ZIP16, Blocks::ScanLines, LineOrder::Increasing);
-    let encoding = Encoding { compression, blocks, line_order };
+    exr_bytes(&exr::image::Image::from_encoded_channels(size, EXR, SpecificChannels::rgb(pixel)))
+}
+
+/// Encoding of OpenEXR files.
+pub(crate) const EXR: Encoding = Encoding {
+    compression: Compression::ZIP16,
+    blocks: Blocks::ScanLines,
+    line_order: LineOrder::Increasing,
+};
+
+/// Bytes of an OpenEXR file.
+pub(crate) fn exr_bytes<'i, L: WritableLayers<'i>>(
+    image: &'i exr::image::Image<L>,
+) -> Result<Vec<u8>, FileError> {
     let mut bytes = Vec::new();
-    exr::image::Image::from_encoded_channels(size, encoding, SpecificChannels::rgb(pixel))
+    image
         .write()
         // In parallel `exr` starts threads of its own.
         .non_parallel()

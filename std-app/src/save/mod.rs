@@ -13,6 +13,7 @@ pub use crate::picture::MAX_PIXELS;
 pub use destination::{Destination, Identity};
 pub use file::{check_destination, check_writable, read, read_within, write, write_bytes, write_with};
 pub(crate) use file::{replace, replace_with};
+pub(crate) use format::{EXR, exr_bytes};
 pub use format::{Format, encode};
 pub use image::{Image, display_byte, from_srgb, to_srgb};
 pub use partial_file::abandon;
