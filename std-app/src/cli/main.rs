@@ -5,6 +5,7 @@
 mod bake;
 mod bake_parts;
 mod camera_args;
+mod checkpoint_args;
 mod compare;
 mod failure;
 mod info;

@@ -1,5 +1,6 @@
 //! `halflight render`: pictures of a scene, with an estimate of their error.
 
+use super::checkpoint_args::CheckpointArgs;
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::outputs::{Outputs, Role};
@@ -10,7 +11,7 @@ use super::{print_note, summary, values};
 use clap::Args;
 use halflight::compare::compare;
 use halflight::load::{self, LoadedScene};
-use halflight::render::{self, Checkpoint, Ending, Settings, Shard, Stop};
+use halflight::render::{self, Ending, Settings, Shard, Stop};
 use halflight::report::{Provenance, Run};
 use halflight::values::{Samples, TargetError};
 use std::path::PathBuf;
@@ -50,16 +51,8 @@ pub(super) struct Render {
     #[arg(long, value_name = "RELMSE", value_parser = values::checked::<f64, TargetError>, display_order = 6)]
     error: Option<TargetError>,
 
-    /// Keep the film in a file during the render, for --resume and `halflight merge`
-    #[arg(long, value_name = "FILE", help_heading = "Parts")]
-    checkpoint: Option<PathBuf>,
-    /// Interval between checkpoints; the last one is written at the end [default: 60s]
-    #[arg(long, value_name = "TIME", value_parser = values::duration, requires = "checkpoint",
-        help_heading = "Parts")]
-    checkpoint_every: Option<f64>,
-    /// Continue the film of a checkpoint, with the same flags except --spp, --time and --error
-    #[arg(long, value_name = "FILE", help_heading = "Parts")]
-    resume: Option<PathBuf>,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
     /// Render every Nth tile from the Ith on into the film of --checkpoint; a picture only with -o
     #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "checkpoint",
         conflicts_with_all = ["time", "error"], help_heading = "Parts")]
@@ -108,11 +101,10 @@ impl Render {
             false => (stop, by_default),
         };
         let settings = self.picture.settings(&loaded, self.method, &self.method_args, stop, reference)?;
-        let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
         let settings = Settings {
             shard: self.shard.unwrap_or(Shard::WHOLE),
-            checkpoint: self.checkpoint.clone().map(|path| Checkpoint { path, every }),
-            resume: self.resume.clone(),
+            checkpoint: self.checkpoint.checkpoint(),
+            resume: self.checkpoint.resume(),
             load_cache: self.load_cache.clone(),
             save_cache: self.save_cache.clone(),
             survey: self.report.is_some().then_some(SURVEY_POINTS),
@@ -162,12 +154,12 @@ impl Render {
     fn outputs(&self, role: Role, pictures: &[PathBuf]) -> Result<Outputs, Failure> {
         let mut outputs = Outputs::new(self.json);
         pictures.iter().try_for_each(|picture| outputs.plan(role, picture))?;
-        self.checkpoint.iter().try_for_each(|film| outputs.plan(Role::Checkpoint, film))?;
+        self.checkpoint.plan(&mut outputs)?;
         self.save_cache.iter().try_for_each(|cache| outputs.plan(Role::Cache, cache))?;
         self.report.iter().try_for_each(|folder| outputs.plan_report(folder))?;
         outputs.protect(&self.scene)?;
         self.picture.reference_file().map_or(Ok(()), |reference| outputs.protect(reference))?;
-        self.resume.iter().try_for_each(|film| outputs.protect_except(film, Role::Checkpoint))?;
+        self.checkpoint.protect(&outputs)?;
         self.load_cache.iter().try_for_each(|cache| outputs.protect_except(cache, Role::Cache))?;
         Ok(outputs)
     }
