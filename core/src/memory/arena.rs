@@ -49,11 +49,12 @@ pub struct Arena<'m> {
 }
 
 impl<'m> Arena<'m> {
-    /// Arena over `bytes`. Bytes before the first multiple of [`ALIGNMENT`] stay unused. A
-    /// [`Footprint`](super::Footprint) is therefore exact for memory made of [`Line`]s.
+    /// Arena over the whole lines of `bytes`. Bytes before the first multiple of [`ALIGNMENT`] and behind the
+    /// last stay unused. A [`Footprint`](super::Footprint) is therefore exact for memory made of [`Line`]s.
     pub fn new(bytes: &'m mut [u8]) -> Self {
         let skip = bytes.as_ptr().align_offset(ALIGNMENT).min(bytes.len());
-        Self { rest: &mut bytes[skip..] }
+        let whole = (bytes.len() - skip) / ALIGNMENT * ALIGNMENT;
+        Self { rest: &mut bytes[skip..skip + whole] }
     }
 
     /// Arena over `lines`, of which it wastes no byte.
@@ -110,7 +111,18 @@ mod tests {
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
         assert_eq!(Arena::new(bytes).slice::<u32>(48).map(|s| s.len()), Ok(48));
         let short = Arena::new(&mut bytes[..191]).slice::<u32>(48).map(|s| s.len());
-        assert_eq!(short, Err(OutOfMemory { needed: 192, available: 191 }));
+        assert_eq!(short, Err(OutOfMemory { needed: 192, available: 128 }));
+    }
+
+    #[test]
+    fn all_that_is_available_can_be_taken_from_bytes_of_any_place_and_length() {
+        let mut lines = [Line([0; 64]); 4];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
+        for (first, end, available) in [(0, 256, 256), (1, 256, 192), (16, 240, 128), (1, 63, 0), (0, 0, 0)] {
+            let mut arena = Arena::new(&mut bytes[first..end]);
+            assert_eq!(arena.available(), available);
+            assert_eq!(arena.slice::<u8>(available).map(|taken| taken.len()), Ok(available));
+        }
     }
 
     #[test]
