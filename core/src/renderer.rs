@@ -23,15 +23,14 @@ pub use rounds::{Estimates, Plan, Rounds, Stop, StopRule};
 pub use settings::{Reconstruct, RequiredMemory, Settings, Until};
 
 use crate::Rgb;
-use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::census::{Census, FeatureSet};
 use crate::estimate::ErrorEstimate;
-use crate::film::Film;
+use crate::film::{Film, Pixel};
 use crate::findings::Findings;
 use crate::memory::Arena;
-use crate::method::{Executor, MethodKind};
+use crate::method::{Executor, MethodKind, Shard};
 use crate::scene::Scene;
-use build::{Build, build_for, of_build};
+use build::{All, Build, DiffuseTextured, Opaque, build_for, of_build};
 
 /// A picture in progress.
 ///
@@ -116,6 +115,13 @@ impl<'a> Renderer<'a> {
     /// Sums of the samples, with their halves.
     pub fn film(&self) -> &Film<'a> {
         of_build!(&self.build, renderer => renderer.film())
+    }
+
+    /// Replaces the tiles of `shard` by those of another renderer of this picture, whose settings have that
+    /// shard: `pixels` of its film, and its number of `samples`. With the tiles of all shards the picture has
+    /// the bits of one render; the next [`Renderer::step`] judges it.
+    pub fn take_tiles(&mut self, shard: Shard, pixels: &[Pixel], samples: u32) {
+        of_build!(&mut self.build, renderer => renderer.take_tiles(shard, pixels, samples));
     }
 
     /// Samples of the least sampled pixel.

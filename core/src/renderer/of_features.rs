@@ -6,7 +6,7 @@ use super::{RenderError, RequiredMemory, Settings, Until};
 use crate::audit::{Audit, AuditSettings, ErrorReport, ExtraTime, MethodAtWork, Spent, audit_fraction};
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
-use crate::film::Film;
+use crate::film::{Film, PIXELS_PER_TILE, Pixel};
 use crate::findings::Findings;
 use crate::light::LightSampler;
 use crate::memory::{Arena, Buffer, OutOfMemory};
@@ -16,7 +16,7 @@ use crate::method::environment_visibility::learn;
 use crate::method::hidden_light::HiddenLight;
 use crate::method::{
     Attempt, ChosenMethod, Executor, Loop, MethodKind, MethodPlan, MethodSetup, PilotSize, RenderContext,
-    RenderMethod, RenderState, Round,
+    RenderMethod, RenderState, Round, Shard,
 };
 use crate::reconstruction::FilmReconstruction;
 use crate::scene::Scene;
@@ -234,6 +234,19 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
     /// Sums of the samples.
     pub fn film(&self) -> &Film<'a> {
         &self.state.film
+    }
+
+    /// See [`Renderer::take_tiles`](super::Renderer::take_tiles).
+    pub fn take_tiles(&mut self, shard: Shard, pixels: &[Pixel], samples: u32) {
+        let RenderState { film, samples: of_tiles, .. } = &mut self.state;
+        let tiles = film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(pixels.chunks(PIXELS_PER_TILE));
+        let tiles = tiles.zip(of_tiles.iter_mut()).enumerate().filter(|(tile, _)| shard.owns(*tile));
+        for (_, ((own, other), of_tile)) in tiles {
+            if own.len() == other.len() {
+                own.copy_from_slice(other);
+                *of_tile = samples;
+            }
+        }
     }
 
     /// Reconstruction of the picture, if it is wanted.

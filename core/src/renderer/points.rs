@@ -7,9 +7,8 @@ mod value;
 pub use film::PointFilm;
 pub use value::{PointIrradiance, PointSettings};
 
-use super::build::{Build, build_for, of_build};
+use super::build::{All, Build, DiffuseTextured, Opaque, build_for, of_build};
 use super::{RenderError, RequiredMemory, Until};
-use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::bvh::Bvh;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 use crate::findings::Findings;
