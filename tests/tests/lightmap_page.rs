@@ -3,6 +3,7 @@
 //! which fetches the package `three`.
 
 use crate::browser::{Folder, browser, noted, opened_at, with_script};
+use crate::server::{THREE, package, serve};
 use core::f64::consts::PI;
 use core::sync::atomic::AtomicBool;
 use halflight::bake::{
@@ -16,13 +17,7 @@ use halflight::render::{Method, Settings, Stop, render};
 use halflight::save::{Format, Image, from_srgb};
 use halflight_core::glam::{DVec3, Vec3};
 use halflight_core::{IrradiancePoint, Rgb};
-use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-
-/// The version of three.js whose layouts the page relies on.
-const THREE: &str = "three@0.187.0";
+use std::path::Path;
 
 /// Largest mean FLIP of the room in the browser against our own picture.
 const MOST_FLIP: f64 = 0.05;
@@ -33,65 +28,6 @@ const BYTES: f64 = 0.005;
 
 /// The same beside irradiances by its normals: at this place harmonics of degree 2 have an error of 0.022.
 const MOST_ERROR: f64 = 0.03;
-
-/// The folder of the package `three`, which npm fetches into the folder of builds once.
-fn three() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target").join(THREE);
-    let package = folder.join("package");
-    if package.is_dir() {
-        return Some(package);
-    }
-    let npm = Command::new("npm").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
-    if !npm.is_ok_and(|status| status.success()) {
-        println!("skipped: no npm on this machine to fetch {THREE}");
-        return None;
-    }
-    std::fs::create_dir_all(&folder).unwrap();
-    let run = |program: &str, arguments: &[&str]| {
-        let output = Command::new(program).args(arguments).current_dir(&folder).output().unwrap();
-        assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8_lossy(&output.stdout).trim().to_owned()
-    };
-    let archive = run("npm", &["pack", THREE, "--silent"]);
-    run("tar", &["xzf", archive.lines().last().unwrap()]);
-    Some(package)
-}
-
-/// Serves the files of `folder`, and those of `three` below /three/, to browsers of this machine until the
-/// program ends. Returns the port.
-fn serve(folder: PathBuf, three: PathBuf) -> u16 {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = listener.local_addr().unwrap().port();
-    std::thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
-            let (folder, three) = (folder.clone(), three.clone());
-            std::thread::spawn(move || answer(stream, &folder, &three));
-        }
-    });
-    port
-}
-
-fn answer(mut stream: TcpStream, folder: &Path, three: &Path) -> std::io::Result<()> {
-    let mut lines = BufReader::new(stream.try_clone()?).lines().map_while(Result::ok);
-    let request = lines.next().unwrap_or_default();
-    lines.find(|line| line.is_empty());
-    let name = request.split(['?', ' ']).nth(1).unwrap_or_default().trim_start_matches('/');
-    let path = name.strip_prefix("three/").map_or_else(|| folder.join(name), |name| three.join(name));
-    let (status, bytes) = match std::fs::read(&path) {
-        Ok(bytes) => ("200 OK", bytes),
-        Err(_) => ("404 Not Found", Vec::new()),
-    };
-    let kind = match path.extension().and_then(|extension| extension.to_str()) {
-        Some("html") => "text/html",
-        Some("js") => "text/javascript",
-        Some("json") => "application/json",
-        _ => "application/octet-stream",
-    };
-    let length = bytes.len();
-    write!(stream, "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n")?;
-    write!(stream, "Connection: close\r\n\r\n")?;
-    stream.write_all(&bytes)
-}
 
 /// Notes the pixels of the canvas, in rows from the bottom.
 const SCRIPT: &str = "(async () => {
@@ -175,7 +111,7 @@ fn sphere_pixels(side: u32) -> Vec<(usize, Vec3)> {
 
 #[test]
 fn three_js_shows_the_lightmap_and_the_probes_as_we_do() {
-    let (Some(browser), Some(three)) = (browser(), three()) else { return };
+    let (Some(browser), Some(three)) = (browser(), package(THREE)) else { return };
     let folder = Folder::new("lightmap");
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/lightmap");
     let page = std::fs::read_to_string(scene.join("index.html")).unwrap();
@@ -184,7 +120,7 @@ fn three_js_shows_the_lightmap_and_the_probes_as_we_do() {
     let options = LoadOptions { keeps_texcoords: true, ..LoadOptions::default() };
     let loaded = load(&scene.join("room.toml"), &options).unwrap();
     write_light(&loaded, &folder.0);
-    let port = serve(folder.0.clone(), three);
+    let (port, _posted) = serve(folder.0.clone(), &[("three", three)]);
 
     let (room, _) = shown(browser, &folder.0, port, "?sphere=off");
     let (width, height) = (room.width, room.height);

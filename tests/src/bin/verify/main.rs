@@ -3,6 +3,7 @@
 //! build.
 #![forbid(unsafe_code)]
 
+mod bindings;
 mod command;
 mod doors;
 mod fuzz;
@@ -66,6 +67,8 @@ const STEPS: &[Step] = &[
     step("doors", "public names of the core are those of core/doors.txt", doors::check, When::Whole),
     step("docs", "rustdoc without a warning", quality::docs, When::Whole),
     step("targets", "the tiny render on every target: same bits", targets::check, When::Whole),
+    step("c", "programs in C and C++ call the library", bindings::c, When::Whole),
+    step("web", "the module for browsers: bits, types, its page", bindings::web, When::Whole),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
     step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),

@@ -4,7 +4,7 @@ use crate::command::{command, run, run_with_report};
 use crate::{Outcome, Project};
 
 /// Directories with their own workspace.
-const WORKSPACES: &[&str] = &[".", "tests/targets", "fuzz"];
+const WORKSPACES: &[&str] = &[".", "tests/targets", "fuzz", "core/bindings/c"];
 
 /// Clippy selections: directory and arguments. The main workspace uses the profile of tests, to share
 /// compiled macros and build scripts.

@@ -151,7 +151,7 @@ fn one(project: &Project, build: &Build, expected: &[&str]) -> Outcome {
 
 /// A cargo that builds for `triple`: rustup's if it has the target, else Debian's compiler with the source of
 /// `core` (packages rustc-web, cargo-web, rust-web-src) and rustup's linker.
-fn cross_cargo(folder: &Path, triple: &str) -> Result<Command, Failure> {
+pub(crate) fn cross_cargo(folder: &Path, triple: &str) -> Result<Command, Failure> {
     let libraries = output(command(folder, "rustc --print target-libdir --target").arg(triple))?;
     if Path::new(&libraries).exists() {
         return Ok(command(folder, "cargo build"));

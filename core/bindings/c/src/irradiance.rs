@@ -1,0 +1,140 @@
+//! Irradiance at points of a scene, each with its interval.
+
+use crate::executor::{HalflightExecutor, Scratch};
+use crate::memory::{array, array_mut, bytes_of, place, shared, unique};
+use crate::scene::HalflightScene;
+use crate::settings::HalflightPointSettings;
+use crate::status::{HalflightStatus, of};
+use core::ffi::c_void;
+use halflight_core::glam::Vec3;
+use halflight_core::memory::{ALIGNMENT, Arena, Footprint};
+use halflight_core::{IrradiancePoint, IrradianceRenderer, Until};
+
+/// A place with the unit normal of its hemisphere. Points within rounding of a surface are put on it.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct HalflightPoint {
+    /// Position.
+    pub position: [f32; 3],
+    /// Unit normal.
+    pub normal: [f32; 3],
+}
+
+/// Irradiance of a point.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct HalflightIrradiance {
+    /// Irradiance, W/m².
+    pub irradiance: [f32; 3],
+    /// Lower end of the 95 % interval of its luminance.
+    pub lower: f32,
+    /// Upper end; infinite below two samples.
+    pub upper: f32,
+    /// Number of samples.
+    pub samples: u32,
+}
+
+/// Irradiance of points in progress.
+pub struct HalflightIrradianceRenderer {
+    renderer: IrradianceRenderer<'static>,
+    scratch: Scratch,
+}
+
+/// Bytes for `count` points of `scene` and the `threads` of an executor.
+///
+/// # Safety
+/// `scene` is null or a scene.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn halflight_irradiance_memory(
+    scene: *const HalflightScene,
+    count: usize,
+    threads: usize,
+) -> usize {
+    // SAFETY: by the caller.
+    let Ok(scene) = (unsafe { shared(scene) }) else { return 0 };
+    let memory = IrradianceRenderer::required_memory(&scene.scene, count);
+    let bytes = memory.with_workers(threads.max(1)).saturating_add(threads.max(1) * ALIGNMENT);
+    let points = Footprint::default().slice::<IrradiancePoint>(count);
+    bytes_of::<HalflightIrradianceRenderer>(points.slice::<u8>(bytes))
+}
+
+/// Prepares `count` points of `scene` in `bytes` bytes at `memory`. The scene must stay; `points` need not.
+/// `settings` and `executor` may be null.
+///
+/// # Safety
+/// Pointers are null or of arrays as large as they say; `memory` belongs to the renderer from now on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn halflight_irradiance_new(
+    scene: *const HalflightScene,
+    points: *const HalflightPoint,
+    count: usize,
+    settings: *const HalflightPointSettings,
+    executor: *const HalflightExecutor,
+    memory: *mut c_void,
+    bytes: usize,
+    renderer: *mut *mut HalflightIrradianceRenderer,
+) -> HalflightStatus {
+    let make = |arena: &mut Arena<'static>| {
+        // SAFETY: by the caller, in these four lines.
+        let (scene, points) = unsafe { (&shared(scene)?.scene, array(points, count)?) };
+        let given = unsafe { HalflightExecutor::at(executor) };
+        let settings = unsafe { settings.as_ref() };
+        let settings = settings.map(HalflightPointSettings::of_core).transpose()?.unwrap_or_default();
+        let free = arena.slice::<IrradiancePoint>(count)?;
+        for (to, point) in free.iter_mut().zip(points) {
+            *to =
+                IrradiancePoint::free(point.position.into(), Vec3::from(point.normal).normalize_or(Vec3::Y));
+        }
+        let each = IrradianceRenderer::required_memory(scene, count).scratch;
+        let mut scratch = Scratch::new(given.threads, each, arena)?;
+        let renderer = IrradianceRenderer::new(scene, free, &settings, arena, &mut scratch.executor(given))?;
+        Ok(HalflightIrradianceRenderer { renderer, scratch })
+    };
+    // SAFETY: by the caller.
+    of(unsafe { place((memory, bytes), renderer, make) })
+}
+
+/// Adds samples until each point has `samples`, or, where `error` is above 0, until the intervals of nearly
+/// all points are within the relative error: then 0 `samples` are no limit. `executor` may be null.
+///
+/// # Safety
+/// `renderer` is one that no one else uses; `executor` is null or an executor.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn halflight_irradiance_step(
+    renderer: *mut HalflightIrradianceRenderer,
+    executor: *const HalflightExecutor,
+    samples: u32,
+    error: f64,
+) -> HalflightStatus {
+    // SAFETY: by the caller.
+    let (renderer, given) = unsafe { (unique(renderer), HalflightExecutor::at(executor)) };
+    of(renderer.and_then(|HalflightIrradianceRenderer { renderer, scratch }| {
+        let mut executor = scratch.executor(given);
+        Ok(match (error > 0.0, samples) {
+            (true, 0) => renderer.step(&mut executor, Until::Error(error)),
+            (true, most) => renderer.step_within(&mut executor, error, most),
+            (false, samples) => renderer.step(&mut executor, Until::Samples(samples)),
+        }?)
+    }))
+}
+
+/// Writes the irradiance of the first `count` points, in the order of the points.
+///
+/// # Safety
+/// `renderer` is one that no one writes; `values` has `count` elements.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn halflight_irradiance_values(
+    renderer: *const HalflightIrradianceRenderer,
+    values: *mut HalflightIrradiance,
+    count: usize,
+) -> HalflightStatus {
+    // SAFETY: by the caller.
+    let arrays = unsafe { (|| Ok((shared(renderer)?, array_mut(values, count)?)))() };
+    of(arrays.map(|(renderer, values)| {
+        for (to, value) in values.iter_mut().zip(renderer.renderer.values()) {
+            let irradiance = value.irradiance.to_array();
+            let (lower, upper, samples) = (value.lower, value.upper, value.samples);
+            *to = HalflightIrradiance { irradiance, lower, upper, samples };
+        }
+    }))
+}

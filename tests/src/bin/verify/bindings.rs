@@ -1,0 +1,44 @@
+//! The interfaces of the core for C and for the web: built, called by programs of these languages.
+
+use crate::command::{command, exists, run};
+use crate::targets::cross_cargo;
+use crate::{Failure, Outcome, Project};
+use std::fs;
+
+/// Triple of WebAssembly.
+const WEB: &str = "wasm32-unknown-unknown";
+
+/// Compiles C programs against the library and runs them. The products are those of the main workspace.
+pub(crate) fn c(project: &Project) -> Outcome {
+    if !exists("cc") {
+        return Err(Failure::Missing("no C compiler: apt-get install gcc".to_owned()));
+    }
+    let folder = project.root.join("core/bindings/c");
+    for line in
+        ["cargo build --profile quick --locked --quiet", "cargo test --profile quick --locked --quiet"]
+    {
+        run(command(&folder, line).env("CARGO_TARGET_DIR", project.root.join("target")))?;
+    }
+    Ok("header, programs in C and C++".to_owned())
+}
+
+/// Builds the module for the web, and calls it under node and in a browser.
+pub(crate) fn web(project: &Project) -> Outcome {
+    if !exists("node") {
+        return Err(Failure::Missing("no node: apt-get install nodejs".to_owned()));
+    }
+    let folder = project.root.join("core/bindings/c");
+    let mut cargo = cross_cargo(&folder, WEB)?;
+    let line = "--profile web --locked --quiet --no-default-features --features small --target";
+    run(cargo.args(line.split(' ')).arg(WEB).env("RUSTFLAGS", "-C target-feature=+simd128"))?;
+    let io = |error: std::io::Error| Failure::Failed(format!("halflight.wasm: {error}"));
+    let built = folder.join("target").join(WEB).join("web/halflight.wasm");
+    let module = project.root.join("core/bindings/wasm/halflight.wasm");
+    let bytes = fs::copy(built, &module).map_err(io)?;
+    let line = "cargo test --profile quick --locked --quiet web";
+    run(command(&folder, line).env("CARGO_TARGET_DIR", project.root.join("target")))?;
+    let line =
+        "cargo test --profile quick --locked --quiet -p halflight-tests --test main web_page:: -- --ignored";
+    run(&mut command(&project.root, line))?;
+    Ok(format!("{bytes} bytes: bits of the native library, and its page"))
+}
