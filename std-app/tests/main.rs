@@ -8,6 +8,7 @@ mod cli;
 mod compare;
 mod fair_schedule;
 mod lightmaps;
+mod live;
 mod loading;
 #[cfg(target_os = "linux")]
 mod memory;

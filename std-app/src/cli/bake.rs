@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::outputs::{Outputs, Role};
 use super::picture_args::{Caustics, note_darkness, render_failure};
-use super::progress::ProgressReporter;
+use super::progress::{ProgressArgs, ProgressReporter};
 use super::{print_note, values};
 use clap::{Args, ValueEnum};
 use halflight::bake::{
@@ -85,6 +85,8 @@ pub(super) struct Bake {
     memory: Option<usize>,
     #[command(flatten)]
     parts: BakeParts,
+    #[command(flatten)]
+    progress: ProgressArgs,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
@@ -117,6 +119,7 @@ impl Bake {
     }
 
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
+        self.progress.apply();
         if let Some(run) = self.lightmap.run(self).or_else(|| self.probes.run(self)) {
             return run;
         }
@@ -198,7 +201,9 @@ impl Bake {
             let within = self.error.map_or(String::new(), |_| format!(", {finished} of {tiles} tiles"));
             let seconds = readable_seconds(progress.seconds);
             let text = format!("{} samples per point{within}, {seconds}", progress.samples);
-            reporter.report_text(&text, progress.seconds, progress.seconds_left);
+            let state =
+                json!({ "samples": progress.samples, "tiles": { "all": tiles, "finished": finished } });
+            reporter.report_text((&text, state), progress.seconds, progress.seconds_left);
         };
         let baked = bake::irradiance(&scene, points, &settings, &mut progress, &INTERRUPT);
         reporter.end();

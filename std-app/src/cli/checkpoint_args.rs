@@ -13,33 +13,47 @@ pub(super) struct CheckpointArgs {
     #[arg(long, value_name = "FILE", help_heading = "Parts")]
     checkpoint: Option<PathBuf>,
     /// Interval between checkpoints; the last one is written at the end [default: 60s]
-    #[arg(long, value_name = "TIME", value_parser = values::duration, requires = "checkpoint",
-        help_heading = "Parts")]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Parts")]
     checkpoint_every: Option<f64>,
     /// Continue the file of a checkpoint, with the same flags except --spp, --time and --error
     #[arg(long, value_name = "FILE", help_heading = "Parts")]
     resume: Option<PathBuf>,
+    /// Keep the samples in a file as --checkpoint does, and continue it as --resume does if it exists
+    #[arg(long = "continue", value_name = "FILE", conflicts_with_all = ["checkpoint", "resume"],
+        help_heading = "Parts")]
+    continued: Option<PathBuf>,
 }
 
 impl CheckpointArgs {
-    /// Plans the file.
-    pub(super) fn plan(&self, outputs: &mut Outputs) -> Result<(), Failure> {
-        self.checkpoint.iter().try_for_each(|file| outputs.plan(Role::Checkpoint, file))
+    /// Plans the file, which a shard needs.
+    pub(super) fn plan(&self, outputs: &mut Outputs, is_shard: bool) -> Result<(), Failure> {
+        let flag =
+            if is_shard { Some("--shard") } else { self.checkpoint_every.map(|_| "--checkpoint-every") };
+        match (self.written(), flag) {
+            (Some(file), _) => outputs.plan(Role::Checkpoint, file),
+            (None, None) => Ok(()),
+            (None, Some(flag)) => Err(Failure::new(format!("{flag} has no checkpoint"))
+                .advice("add --checkpoint FILE, or --continue FILE")),
+        }
     }
 
     /// Protects the file to be continued.
     pub(super) fn protect(&self, outputs: &Outputs) -> Result<(), Failure> {
-        self.resume.iter().try_for_each(|file| outputs.protect_except(file, Role::Checkpoint))
+        self.resume().iter().try_for_each(|file| outputs.protect_except(file, Role::Checkpoint))
+    }
+
+    fn written(&self) -> Option<&PathBuf> {
+        self.checkpoint.as_ref().or(self.continued.as_ref())
     }
 
     /// The file to write.
     pub(super) fn checkpoint(&self) -> Option<Checkpoint> {
         let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
-        self.checkpoint.clone().map(|path| Checkpoint { path, every })
+        self.written().cloned().map(|path| Checkpoint { path, every })
     }
 
     /// The file to continue.
     pub(super) fn resume(&self) -> Option<PathBuf> {
-        self.resume.clone()
+        self.resume.clone().or_else(|| self.continued.clone().filter(|file| file.exists()))
     }
 }

@@ -10,6 +10,8 @@ mod compare;
 mod failure;
 mod info;
 mod interrupt;
+mod live_args;
+mod manual;
 mod merge;
 mod outputs;
 mod picture_args;
@@ -22,7 +24,7 @@ mod summary;
 mod values;
 mod view_args;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use failure::Failure;
 use halflight::memory::Budget;
 use halflight::pool::in_pool;
@@ -49,6 +51,8 @@ enum Command {
     Merge(merge::Merge),
     Race(Box<race::Race>),
     Info(info::Info),
+    Completions(manual::Completions),
+    Man(manual::Man),
 }
 
 impl Command {
@@ -70,6 +74,8 @@ impl Command {
             Command::Merge(command) => command.run(),
             Command::Race(command) => command.run(),
             Command::Info(command) => command.run(),
+            Command::Completions(command) => command.run(&mut Cli::command()),
+            Command::Man(command) => command.run(Cli::command()),
         }
     }
 }

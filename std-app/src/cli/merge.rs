@@ -3,12 +3,13 @@
 use super::bake::tables;
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
-use super::summary;
 use super::view_args::ViewArgs;
+use super::{summary, values};
 use clap::Args;
 use halflight::bake::{self, MergedBake};
 use halflight::render::{self, Merged};
 use halflight::report::{dropped_object, error_object, file_name, findings_object};
+use halflight::values::TargetError;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -28,6 +29,9 @@ pub(super) struct Merge {
     output: Vec<PathBuf>,
     #[command(flatten)]
     view: ViewArgs,
+    /// Add the samples per pixel that relMSE needs to fall to this value, of pictures of the same settings
+    #[arg(long, value_name = "RELMSE", value_parser = values::checked::<f64, TargetError>)]
+    for_error: Option<TargetError>,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
@@ -45,7 +49,7 @@ impl Merge {
         let shown = self.view.shown(&merged.image, &self.output);
         let saved = outputs.save_to(&self.output, &merged.image, &shown);
         let results =
-            if self.json { self.object(&merged, &saved).to_string() } else { text(&merged, &saved) };
+            if self.json { self.object(&merged, &saved).to_string() } else { self.text(&merged, &saved) };
         Ok(outputs.end(&results, ExitCode::SUCCESS))
     }
 
@@ -93,6 +97,7 @@ impl Merge {
             "shadow_rays": counters.shadow_rays,
             "paths": counters.paths,
             "mean_radiance": merged.image.mean(),
+            "spp_for_error": self.samples_needed(merged).map(|needed| needed.ok()),
             "error": error_object(merged.error, merged.noise_and_blur, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
             "findings": findings_object(&merged.findings),
@@ -100,21 +105,40 @@ impl Merge {
             "outputs": saved.iter().map(|file| file_name(file)).collect::<Value>(),
         })
     }
-}
 
-fn text(merged: &Merged, saved: &[&PathBuf]) -> String {
-    let mut lines: Vec<_> = saved.iter().map(|output| format!("saved  {}", output.display())).collect();
-    let (width, height) = (merged.image.width, merged.image.height);
-    lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
-    match &merged.audit {
-        Some(audit) => lines.extend(summary::audited(audit)),
-        None => lines.extend(summary::estimate(
-            merged.error,
-            merged.noise_and_blur,
-            (merged.is_biased, &merged.findings),
-        )),
+    /// Samples per pixel for the error of `--for-error`, or the reason why there is no number.
+    fn samples_needed(&self, merged: &Merged) -> Option<Result<u64, &'static str>> {
+        let wanted = f64::from(self.for_error?);
+        let Some(error) = merged.error else { return Some(Err("the error of this picture is unknown")) };
+        // Bias does not fall with more samples; noise falls as 1 / n.
+        let bias = merged.audit.as_ref().map_or(0.0, |audit| audit.bias.upper.max(0.0));
+        let noise = (error.upper - bias).max(0.0);
+        Some(match wanted > bias {
+            true => Ok((f64::from(merged.spp) * (noise / (wanted - bias)) / 4.0).ceil() as u64 * 4),
+            false => Err("the bias of the method alone may be larger"),
+        })
     }
-    lines.extend(merged.findings.iter().map(|finding| format!("       {}", summary::finding(finding))));
-    lines.extend(summary::rejected(&merged.counters, &merged.rejected_tiles, merged.empty_pixels));
-    lines.join("\n")
+
+    fn text(&self, merged: &Merged, saved: &[&PathBuf]) -> String {
+        let mut lines: Vec<_> = saved.iter().map(|output| format!("saved  {}", output.display())).collect();
+        let (width, height) = (merged.image.width, merged.image.height);
+        lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
+        lines.extend(self.samples_needed(merged).map(|needed| match needed {
+            Ok(samples) => {
+                format!("       {samples} samples per pixel are needed for the error of --for-error")
+            }
+            Err(reason) => format!("       no number of samples is known for --for-error: {reason}"),
+        }));
+        match &merged.audit {
+            Some(audit) => lines.extend(summary::audited(audit)),
+            None => lines.extend(summary::estimate(
+                merged.error,
+                merged.noise_and_blur,
+                (merged.is_biased, &merged.findings),
+            )),
+        }
+        lines.extend(merged.findings.iter().map(|finding| format!("       {}", summary::finding(finding))));
+        lines.extend(summary::rejected(&merged.counters, &merged.rejected_tiles, merged.empty_pixels));
+        lines.join("\n")
+    }
 }

@@ -18,7 +18,9 @@ pub(super) enum Role {
     Picture,
     /// Picture without `-o`.
     Default,
-    /// Film of `--checkpoint`.
+    /// Picture of `--preview`.
+    Preview,
+    /// Film of `--checkpoint` or `--continue`.
     Checkpoint,
     /// Table of `bake`.
     Table,
@@ -38,6 +40,7 @@ impl Role {
         match self {
             Role::Picture | Role::Table => "-o",
             Role::Default => "the picture, without -o",
+            Role::Preview => "--preview",
             Role::Checkpoint => "--checkpoint",
             Role::ErrorMap => "--error-map",
             Role::Cache => "--save-cache",
@@ -93,7 +96,7 @@ impl Outputs {
     /// Files that cannot be written or are planned already.
     pub(super) fn plan(&mut self, role: Role, path: &Path) -> Result<(), Failure> {
         match role {
-            Role::Picture | Role::Default => save::check_writable(path)?,
+            Role::Picture | Role::Default | Role::Preview => save::check_writable(path)?,
             Role::Checkpoint | Role::Cache | Role::Table | Role::ErrorMap => save::check_destination(path)?,
             Role::Report | Role::Standard => {}
         }
@@ -197,7 +200,9 @@ impl Outputs {
 
     /// Prints results and failures. Returns `code`, or 2 after a failure.
     pub(super) fn end(mut self, results: &str, code: ExitCode) -> ExitCode {
-        if self.has_stdout {
+        if results.is_empty() {
+            // Only failures are printed.
+        } else if self.has_stdout {
             print_message(results);
         } else if let Err(failure) = print_result(results) {
             self.failures.push(failure);

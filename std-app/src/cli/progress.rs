@@ -1,9 +1,12 @@
-//! Progress on standard error: a bar on a terminal, otherwise a line every five seconds.
+//! Progress on standard error: a bar on a terminal, otherwise a line every five seconds; or objects, whose
+//! schema is docs/progress.schema.json.
 
-use super::stdio::{escaped, print_message, print_note};
+use super::stdio::{self, Messages, escaped, print_event, print_message, print_note};
+use clap::{Args, ValueEnum};
 use halflight::quantity::readable_seconds;
 use halflight::render::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
 use std::io::{IsTerminal, stderr};
 
 /// Seconds between lines.
@@ -11,6 +14,36 @@ const INTERVAL: f64 = 5.0;
 
 /// Steps of the bar.
 const STEPS: u64 = 1000;
+
+/// Flags of messages on standard error.
+#[derive(Args)]
+pub(super) struct ProgressArgs {
+    /// Form of progress and notes on standard error
+    #[arg(long, value_name = "FORM", default_value = "text", help_heading = "Results")]
+    progress: Form,
+    /// Print errors alone: neither progress nor notes nor a summary
+    #[arg(short, long, conflicts_with = "progress", help_heading = "Results")]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Form {
+    /// A bar on a terminal, otherwise a line every five seconds
+    Text,
+    /// An object a line, for programs
+    Json,
+}
+
+impl ProgressArgs {
+    /// Chooses the form of all messages of the program.
+    pub(super) fn apply(&self) {
+        stdio::set_messages(match (self.quiet, self.progress) {
+            (true, _) => Messages::Quiet,
+            (false, Form::Json) => Messages::Json,
+            (false, Form::Text) => Messages::Text,
+        });
+    }
+}
 
 /// Reports the progress of one or several renders.
 pub(super) struct ProgressReporter {
@@ -23,12 +56,22 @@ impl ProgressReporter {
     pub(super) fn new() -> Self {
         let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}");
         let style = style.unwrap_or(ProgressStyle::default_bar());
-        let bar = stderr().is_terminal().then(|| ProgressBar::new(STEPS).with_style(style));
+        let has_bar = stderr().is_terminal() && !stdio::is_json() && !stdio::is_quiet();
+        let bar = has_bar.then(|| ProgressBar::new(STEPS).with_style(style));
         Self { bar, last_line: 0.0 }
     }
 
-    /// Reports `text` after so many seconds, with those that are left if they are limited.
-    pub(super) fn report_text(&mut self, text: &str, seconds: f64, left: Option<f64>) {
+    /// Reports `text` after so many seconds, with those that are left if they are limited. Programs get
+    /// `state` in its place.
+    pub(super) fn report_text(&mut self, (text, state): (&str, Value), seconds: f64, left: Option<f64>) {
+        if stdio::is_json() {
+            let mut object = state;
+            (object["seconds"], object["seconds_left"]) = (seconds.into(), left.into());
+            return print_event("progress", object);
+        }
+        if stdio::is_quiet() {
+            return;
+        }
         let done = left.map_or(0.0, |left| seconds / (seconds + left).max(1e-9));
         if let Some(bar) = &self.bar {
             bar.set_position((done * STEPS as f64) as u64);
@@ -47,7 +90,11 @@ impl ProgressReporter {
             let note = || print_note(format_args!("{error}; the render continues and tries again"));
             self.bar.as_ref().map_or_else(note, |bar| bar.suspend(note));
         }
-        self.report_text(&text, progress.seconds, progress.seconds_left);
+        let error = progress
+            .error
+            .map(|error| json!({ "relmse": error.relmse, "lower": error.lower, "upper": error.upper }));
+        let state = json!({ "render": name, "samples": progress.spp, "error": error });
+        self.report_text((&text, state), progress.seconds, progress.seconds_left);
     }
 
     /// Removes the bar.

@@ -3,15 +3,16 @@
 use super::checkpoint_args::CheckpointArgs;
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
+use super::live_args::LiveArgs;
 use super::outputs::{Outputs, Role};
 use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, note_darkness, render_failure};
-use super::progress::ProgressReporter;
+use super::progress::{ProgressArgs, ProgressReporter};
 use super::view_args::ViewArgs;
-use super::{print_note, summary, values};
+use super::{print_note, stdio, summary, values};
 use clap::Args;
 use halflight::compare::compare;
 use halflight::load::{self, LoadedScene};
-use halflight::render::{self, Ending, Settings, Shard, Stop};
+use halflight::render::{self, Ending, Progress, Settings, Shard, Stop};
 use halflight::report::{Provenance, Run};
 use halflight::values::{Samples, TargetError};
 use std::path::PathBuf;
@@ -39,6 +40,10 @@ pub(super) struct Render {
     picture: PictureArgs,
     #[command(flatten)]
     view: ViewArgs,
+    #[command(flatten)]
+    live: LiveArgs,
+    #[command(flatten)]
+    progress: ProgressArgs,
 
     /// Samples per pixel. Without --spp, --time and --error a render ends at relMSE 1e-3 or after 60 s; a
     /// shard has 256 samples
@@ -54,7 +59,7 @@ pub(super) struct Render {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     /// Render every Nth tile from the Ith on into the film of --checkpoint; a picture only with -o
-    #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "checkpoint",
+    #[arg(long, value_name = "I/N", value_parser = values::shard,
         conflicts_with_all = ["time", "error"], help_heading = "Parts")]
     shard: Option<Shard>,
 
@@ -83,6 +88,7 @@ impl Render {
     }
 
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
+        self.progress.apply();
         let start = Instant::now();
         let (role, pictures) = self.pictures();
         let mut outputs = self.outputs(role, &pictures)?;
@@ -113,13 +119,17 @@ impl Render {
         };
 
         interrupt::install_handler()?;
-        let mut reporter = ProgressReporter::new();
-        let result =
-            render::render(&scene, &settings, &mut |progress| reporter.report("", progress), &INTERRUPT);
+        let (mut reporter, mut live) = (ProgressReporter::new(), self.live.live(&self.view));
+        let mut report = |progress: &Progress| {
+            reporter.report("", progress);
+            live.show(progress);
+        };
+        let result = render::render(&scene, &settings, &mut report, &INTERRUPT);
         reporter.end();
         let result = result.map_err(|error| render_failure(&self.scene, &error))?;
 
         result.unsaved.iter().for_each(|error| outputs.fail(error.clone()));
+        live.put(&result.image);
         let shown = self.view.shown(&result.image, &pictures);
         let saved: Vec<_> = outputs.save_to(&pictures, &result.image, &shown).into_iter().cloned().collect();
         let comparison =
@@ -139,6 +149,7 @@ impl Render {
         let reported = self.report.as_deref().filter(|folder| outputs.save_report(folder, &run.files()));
         let results = match self.json {
             true => run.object().to_string(),
+            false if stdio::is_quiet() => String::new(),
             false => summary::text(&run, reported, by_default),
         };
         let code = match result.ending {
@@ -154,7 +165,8 @@ impl Render {
     fn outputs(&self, role: Role, pictures: &[PathBuf]) -> Result<Outputs, Failure> {
         let mut outputs = Outputs::new(self.json);
         pictures.iter().try_for_each(|picture| outputs.plan(role, picture))?;
-        self.checkpoint.plan(&mut outputs)?;
+        self.checkpoint.plan(&mut outputs, self.shard.is_some())?;
+        self.live.plan(&mut outputs)?;
         self.save_cache.iter().try_for_each(|cache| outputs.plan(Role::Cache, cache))?;
         self.report.iter().try_for_each(|folder| outputs.plan_report(folder))?;
         outputs.protect(&self.scene)?;

@@ -4,6 +4,7 @@
 
 use super::failure::Failure;
 use core::fmt::Display;
+use core::sync::atomic::{AtomicU8, Ordering};
 use halflight::save::Identity;
 use std::borrow::Cow;
 use std::io::{self, Write, stderr, stdout};
@@ -51,15 +52,62 @@ fn is_closed(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::BrokenPipe || (error.raw_os_error() == Some(INPUT_OUTPUT) && !is_file())
 }
 
+/// Form of messages on standard error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Messages {
+    /// Lines for people.
+    Text,
+    /// An object a line.
+    Json,
+    /// Errors alone.
+    Quiet,
+}
+
+/// Form of the messages of this program: 0 to 2, as [`Messages`].
+static MESSAGES: AtomicU8 = AtomicU8::new(Messages::Text as u8);
+
+/// Chooses the form of messages.
+pub(super) fn set_messages(messages: Messages) {
+    MESSAGES.store(messages as u8, Ordering::Relaxed);
+}
+
+fn messages_are(messages: Messages) -> bool {
+    MESSAGES.load(Ordering::Relaxed) == messages as u8
+}
+
+/// True if neither notes nor progress nor summaries are printed.
+pub(super) fn is_quiet() -> bool {
+    messages_are(Messages::Quiet)
+}
+
+/// True if messages are objects.
+pub(super) fn is_json() -> bool {
+    messages_are(Messages::Json)
+}
+
+/// Prints an object of the kind `event` on standard error.
+pub(super) fn print_event(event: &str, mut object: serde_json::Value) {
+    object["event"] = event.into();
+    let _ = stderr().write_all(format!("{object}\n").as_bytes());
+}
+
 /// Prints a line on standard error.
 pub(super) fn print_message(text: impl Display) {
+    if is_json() {
+        return print_event("message", serde_json::json!({ "text": text.to_string() }));
+    }
     // A single write keeps lines of several threads whole.
     let _ = stderr().write_all(format!("{}\n", escaped(&text.to_string())).as_bytes());
 }
 
 /// Prints a note on standard error.
 pub(super) fn print_note(text: impl Display) {
-    print_message(format_args!("note: {text}"));
+    match (is_quiet(), is_json()) {
+        (true, _) => {}
+        (_, true) => print_event("note", serde_json::json!({ "text": text.to_string() })),
+        _ => print_message(format_args!("note: {text}")),
+    }
 }
 
 #[cfg(test)]

@@ -40,15 +40,23 @@ fn exposure(text: &str) -> Result<Exposure, String> {
 }
 
 impl ViewArgs {
+    /// The picture as PNG files show it.
+    pub(super) fn of<'i>(&self, image: &'i Image) -> Cow<'i, Image> {
+        self.transform(image).shown(image)
+    }
+
+    fn transform(&self, image: &Image) -> ViewTransform {
+        let stops = match self.exposure {
+            Exposure::Stops(stops) => stops,
+            Exposure::Auto => automatic_stops(image),
+        };
+        ViewTransform { stops, curve: self.view }
+    }
+
     /// The picture as PNG files show it. Notes one of which a PNG file among `files` shows nothing, with the
     /// exposure that would.
     pub(super) fn shown<'i>(&self, image: &'i Image, files: &[PathBuf]) -> Cow<'i, Image> {
-        let automatic = || automatic_stops(image);
-        let stops = match self.exposure {
-            Exposure::Stops(stops) => stops,
-            Exposure::Auto => automatic(),
-        };
-        let view = ViewTransform { stops, curve: self.view };
+        let view = self.transform(image);
         let is_png = |file: &PathBuf| Format::of(file).is_ok_and(|format| !format.is_linear());
         if let Some(fault) = view.fault(image)
             && self.exposure != Exposure::Auto
@@ -56,7 +64,7 @@ impl ViewArgs {
         {
             print_note(format!(
                 "the picture is nearly all {fault}: --exposure {} would show it",
-                automatic()
+                automatic_stops(image)
             ));
         }
         view.shown(image)
