@@ -10,7 +10,7 @@ use halflight_core::{Arena, Line};
 
 fn main() -> Result<(), OutOfMemory> {
     let scene = room::scene();
-    let mut memory = vec![Line::ZERO; IrradianceSampler::required_memory(&scene).div_ceil(64)];
+    let mut memory = vec![Line::ZERO; Line::count(IrradianceSampler::required_memory(&scene))];
     let sampler = IrradianceSampler::new(&scene, &mut Arena::over(&mut memory))?;
     for texel in 0..64 {
         // A ray down finds the surface, and with it the bound of its rounding error.

@@ -54,7 +54,7 @@ impl Executor for Threads {
 fn main() -> Result<(), RenderError> {
     let (scene, settings) = (room::scene(), Settings::new([64, 64]));
     let memory = Renderer::required_memory(&scene, &settings);
-    let lines = |bytes: usize| vec![Line::ZERO; bytes.div_ceil(64)];
+    let lines = |bytes: usize| vec![Line::ZERO; Line::count(bytes)];
     let mut threads = Threads { scratch: vec![lines(memory.scratch); 2] };
     let mut structures = lines(memory.structures);
     let mut arena = Arena::over(&mut structures);

@@ -10,7 +10,12 @@
 //! | [`Renderer`] | a picture in progress: [`Renderer::step`], [`Renderer::error`], [`Renderer::picture`] |
 //! | [`IrradianceRenderer`] | irradiance at many points, each with a 95 % interval |
 //! | [`Arena`] | the caller's bytes, of which [`Renderer::required_memory`] says the number |
-//! | [`Executor`] | the caller's threads; [`Loop`] is one thread |
+//! | [`Line`] | 64 aligned bytes, of which a `Vec` or a static array makes the arena |
+//! | [`Executor`] | the caller's threads, with an example; [`Loop`] is one thread |
+//!
+//! On a PC the feature `std` is needed for speed: with it [`Level::detect`] finds AVX2 and AVX-512 while the
+//! program runs. Without it the kernels use the instructions of the build target alone, on x86-64 those of
+//! SSE2. The bits of a picture are the same.
 //!
 //! # A picture until its error is small
 //!
@@ -36,7 +41,7 @@
 //!
 //! let settings = Settings::new([32, 24]).with_method(Method::Path(PathOptions::default()));
 //! let memory = Renderer::required_memory(&scene, &settings);
-//! let mut lines = vec![Line::ZERO; memory.with_workers(1).div_ceil(64)];
+//! let mut lines = vec![Line::ZERO; Line::count(memory.with_workers(1))];
 //! let mut arena = Arena::over(&mut lines);
 //! let mut executor = Loop::new(arena.slice(memory.scratch)?);
 //! let mut renderer = Renderer::new(&scene, &settings, &mut arena, &mut executor)?;
@@ -51,13 +56,17 @@
 //! [`Method::all`] lists the methods: path tracing, irradiance and radiance caching, photon mapping,
 //! stochastic progressive photon mapping, light tracing, bidirectional path tracing, vertex connection and
 //! merging, instant radiosity, Metropolis light transport, and [`Method::Auto`], which chooses by predicted
-//! error. `examples/` has one picture by each method in one buffer (`tiny_render.rs`) and a picture on
-//! threads of the caller (`own_threads.rs`).
+//! error. An arena for the largest of their [`Renderer::required_memory`] renders a picture by each in turn.
+//! `examples/` has this in a static buffer (`tiny_render.rs`) and a picture on threads of the caller
+//! (`own_threads.rs`).
+//!
+//! A picture ends by its samples or its error ([`Until`]). Time and interrupts end it through the executor:
+//! [`Loop::until`], or [`Executor::is_over`].
 //!
 //! # Parts
 //!
-//! [`parts`] can be used alone: rays against a mesh, nearest photons, irradiance at points, eigen
-//! decomposition, scattering.
+//! [`parts`] can be used alone: rays against a mesh, nearest photons, irradiance where a ray hits, eigen
+//! decomposition, scattering. [`IrradianceRenderer`] is for many points, for intervals and for threads.
 //!
 //! # Promise
 //!

@@ -84,7 +84,8 @@ impl<'a> Renderer<'a> {
     }
 
     /// Error of the picture: noise by the halves of the film, and bias by the audit or by the blur of
-    /// photons. `None` below four samples per pixel and for a black picture.
+    /// photons. `None` below four samples per pixel, and for a black picture unless a pilot has estimated the
+    /// light that it lacks: an error of 0 is one of a view without light.
     pub fn error(&self) -> Option<ErrorEstimate> {
         self.error_report().error()
     }

@@ -121,7 +121,7 @@ impl<'m> Bvh<'m> {
         level.dispatch(Single::<true> { bvh: self, ray }).is_some()
     }
 
-    /// Nearest hit of each ray.
+    /// Nearest hit of each ray. Rays beyond `hits` are not reported.
     pub fn nearest_batch(&self, level: Level, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         let sink = Nearest(hits);
         match coherence {
@@ -130,7 +130,8 @@ impl<'m> Bvh<'m> {
         }
     }
 
-    /// For each ray 1 if it hits anything, else 0.
+    /// For each ray 1 if it hits anything, else 0. Rays beyond `hidden` are not
+    /// reported.
     pub fn occluded_batch(&self, level: Level, rays: &[Ray], hidden: &mut [u8]) {
         level.dispatch(Stream::<_, true> { bvh: self, rays, sink: Occluded(hidden) });
     }

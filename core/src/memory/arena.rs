@@ -15,6 +15,17 @@ pub struct Line(pub [u8; ALIGNMENT]);
 impl Line {
     /// A line of zeros.
     pub const ZERO: Self = Self([0; ALIGNMENT]);
+
+    /// Number of lines that hold `bytes`.
+    ///
+    /// ```
+    /// use halflight_core::Line;
+    /// static MEMORY: [Line; Line::count(65)] = [Line::ZERO; Line::count(65)];
+    /// assert_eq!(MEMORY.len(), 2);
+    /// ```
+    pub const fn count(bytes: usize) -> usize {
+        bytes.div_ceil(ALIGNMENT)
+    }
 }
 
 /// Error of an arena that is too small.

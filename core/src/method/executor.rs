@@ -37,6 +37,82 @@ pub struct Passed {
 }
 
 /// Runs the tasks of passes. It alone knows threads, clocks and interrupts.
+///
+/// Threads of the standard library, without a clock, each with the memory that
+/// [`RequiredMemory::scratch`](crate::RequiredMemory::scratch) states:
+///
+/// ```
+/// use halflight_core::memory::OutOfMemory;
+/// use halflight_core::parts::rays::{ForkJoin, Serial};
+/// use halflight_core::{Arena, Counters, Executor, Line, Passed, Worker};
+/// use std::sync::Mutex;
+/// use std::sync::atomic::{AtomicBool, Ordering};
+///
+/// struct Threads<'t> {
+///     /// Working memory of each thread.
+///     scratch: Vec<Vec<Line>>,
+///     /// Raised by the caller to end passes.
+///     interrupt: &'t AtomicBool,
+/// }
+///
+/// impl Executor for Threads<'_> {
+///     type Fork = Serial;
+///
+///     fn pass<P, T>(&mut self, pieces: P, task: T) -> Result<Passed, OutOfMemory>
+///     where
+///         P: Iterator<Item: Send> + Send,
+///         T: Fn(usize, P::Item, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
+///     {
+///         let queue = Mutex::new(pieces.enumerate());
+///         let result = Mutex::new(Ok(Passed { counters: Counters::default(), is_complete: true }));
+///         let is_over = || self.interrupt.load(Ordering::Relaxed);
+///         std::thread::scope(|scope| {
+///             let (queue, task, result, is_over) = (&queue, &task, &result, &is_over);
+///             for lines in &mut self.scratch {
+///                 scope.spawn(move || {
+///                     let mut worker = Worker::new(Arena::over(lines), is_over);
+///                     loop {
+///                         let next = queue.lock().unwrap().next();
+///                         let Some((number, piece)) = next else { break };
+///                         // A piece that no thread runs makes the pass incomplete.
+///                         let done = (!is_over()).then(|| task(number, piece, &mut worker));
+///                         let mut result = result.lock().unwrap();
+///                         match (done, &mut *result) {
+///                             (Some(Ok(counters)), Ok(passed)) => passed.counters += counters,
+///                             (Some(Err(error)), Ok(_)) => *result = Err(error),
+///                             (None, Ok(passed)) => passed.is_complete = false,
+///                             (_, Err(_)) => break,
+///                         }
+///                     }
+///                 });
+///             }
+///         });
+///         result.into_inner().unwrap()
+///     }
+///
+///     fn is_over(&self) -> bool {
+///         self.interrupt.load(Ordering::Relaxed)
+///     }
+///
+///     fn fork(&self) -> &Serial {
+///         &Serial
+///     }
+/// }
+///
+/// let interrupt = AtomicBool::new(false);
+/// let mut threads = Threads { scratch: vec![vec![Line::ZERO; 1]; 4], interrupt: &interrupt };
+/// let count = |number, _, _: &mut Worker| Ok(Counters { rays: number as u64, ..Counters::default() });
+/// let passed = threads.pass(0..100, count)?;
+/// assert!(passed.is_complete && passed.counters.rays == 4950);
+///
+/// interrupt.store(true, Ordering::Relaxed);
+/// assert!(!threads.pass(0..100, count)?.is_complete);
+/// # Ok::<(), OutOfMemory>(())
+/// ```
+///
+/// The pieces come from an iterator of any length: a thread takes the next one under a lock. Their results do
+/// not depend on their order. [`Serial`](crate::parts::rays::Serial) builds the hierarchy on one thread; a
+/// [`ForkJoin`] of the caller builds it on several.
 pub trait Executor {
     /// The forks of recursive builds.
     type Fork: ForkJoin;

@@ -1,11 +1,12 @@
 //! Irradiance at points of surfaces, and the derivatives of irradiance from gather rays (Schwarzhaupt, Jensen
-//! and Jarosz 2012).
+//! and Jarosz 2012). [`IrradianceRenderer`](crate::IrradianceRenderer) is for many points: on threads, with
+//! intervals, until their error is small.
 //!
 //! ```
 //! use halflight_core::glam::Vec3;
 //! use halflight_core::parts::irradiance::IrradianceSampler;
 //! use halflight_core::parts::rays::Ray;
-//! use halflight_core::scene::{Camera, Environment, Material, Mesh, Triangle};
+//! use halflight_core::scene::{Environment, Material, Mesh, Triangle};
 //! use halflight_core::{Arena, Line, Rgb, Scene};
 //!
 //! // A floor under a white sky.
@@ -19,7 +20,7 @@
 //!     environment: Some(Environment::uniform(Rgb::ONE)),
 //!     ..Scene::default()
 //! };
-//! let mut lines = vec![Line::ZERO; IrradianceSampler::required_memory(&scene).div_ceil(64)];
+//! let mut lines = vec![Line::ZERO; Line::count(IrradianceSampler::required_memory(&scene))];
 //! let sampler = IrradianceSampler::new(&scene, &mut Arena::over(&mut lines))?;
 //! let down = Ray::new(Vec3::new(0.0, 1.0, 0.0), Vec3::NEG_Y);
 //! let floor = sampler.irradiance(&down, 0, 256).expect("the ray hits the floor");

@@ -9,8 +9,7 @@
 //! let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 //! let triangles = [Triangle { vertices: [0, 1, 2], material: 0 }];
 //! let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
-//! let mut memory = [Line::ZERO; 64];
-//! assert!(Bvh::footprint(triangles.len()).bytes() <= size_of_val(&memory));
+//! let mut memory = vec![Line::ZERO; Line::count(Bvh::footprint(triangles.len()).bytes())];
 //! let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory))?;
 //! let hit = bvh.nearest(Level::detect(), &Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z));
 //! assert_eq!((hit.triangle, hit.t), (0, 1.0));

@@ -50,7 +50,7 @@ impl<'m> Photons<'m> {
         Footprint::default().slice::<Leaf>(leaves).slice::<Node>(Levels::of(leaves).nodes)
     }
 
-    /// Memory for `capacity` photons, at most [`PHOTONS_MAX`].
+    /// Memory for `capacity` photons, at most 2^32 - 1.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Photons::footprint`].

@@ -46,6 +46,37 @@ type Builds<'a> =
     Build<IrradiancePoints<'a, DiffuseTextured>, IrradiancePoints<'a, Opaque>, IrradiancePoints<'a, All>>;
 
 /// Irradiance of many points in progress.
+///
+/// ```
+/// use halflight_core::glam::Vec3;
+/// use halflight_core::scene::{Material, Mesh, Triangle};
+/// use halflight_core::{Arena, Line, Loop, Rgb, Scene, Until};
+/// use halflight_core::{IrradiancePoint, IrradianceRenderer, PointSettings};
+///
+/// // Two sensors that look up at a square lamp.
+/// let positions = [[-0.5, 2.0, -0.5], [0.5, 2.0, -0.5], [0.5, 2.0, 0.5], [-0.5, 2.0, 0.5]];
+/// let triangles = [[0, 1, 2], [0, 2, 3]].map(|vertices| Triangle { vertices, material: 0 });
+/// let scene = Scene {
+///     mesh: Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() },
+///     materials: &[Material::lamp(Rgb::splat(10.0))],
+///     ..Scene::default()
+/// };
+/// let points = [0.0, 1.0].map(|x| IrradiancePoint::free(Vec3::new(x, 0.0, 0.0), Vec3::Y));
+///
+/// let memory = IrradianceRenderer::required_memory(&scene, points.len());
+/// let mut lines = vec![Line::ZERO; Line::count(memory.with_workers(1))];
+/// let mut arena = Arena::over(&mut lines);
+/// let mut executor = Loop::new(arena.slice(memory.scratch)?);
+/// let settings = PointSettings::default();
+/// let mut renderer = IrradianceRenderer::new(&scene, &points, &settings, &mut arena, &mut executor)?;
+/// renderer.step(&mut executor, Until::Error(0.01))?;
+///
+/// let values: Vec<f32> = renderer.values().map(|point| point.value()).collect();
+/// // By the form factors of the lamp.
+/// assert!((values[0] - 2.308).abs() < 0.05 && (values[1] - 1.556).abs() < 0.05);
+/// assert!(renderer.values().all(|point| point.upper - point.lower < 0.05));
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 pub struct IrradianceRenderer<'a> {
     build: Builds<'a>,
     film: PointFilm<'a>,

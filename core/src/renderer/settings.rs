@@ -27,7 +27,8 @@ pub struct Settings {
     pub seed: u32,
     /// Most segments of a path; 1 is directly visible light. `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Highest instruction set to use. [`Level::BASELINE`] gives the same bits on every target.
+    /// Highest instruction set to use; [`Settings::new`] has the one of [`Level::detect`]. The bits are the
+    /// same by all.
     pub level: Level,
     /// Part of the picture to render.
     pub shard: Shard,
@@ -104,7 +105,7 @@ pub struct RequiredMemory {
     /// Bytes of the arena for hierarchy, lights, film and the structures of the method in their usual sizes.
     /// Some of them grow where there is more.
     pub structures: usize,
-    /// Bytes of working memory of each worker of the executor.
+    /// Bytes of working memory of each worker of the executor, a multiple of 64.
     pub scratch: usize,
 }
 
@@ -121,6 +122,7 @@ impl RequiredMemory {
 pub enum Until {
     /// Samples of each pixel, those of earlier steps included.
     Samples(u32),
-    /// Upper end of the interval of the error, relMSE.
+    /// Error. Of a picture: the upper end of the interval of its relMSE. Of points: the half-width of their
+    /// intervals, as [`IrradianceRenderer::step`](super::IrradianceRenderer::step) defines it.
     Error(f64),
 }

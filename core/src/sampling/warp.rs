@@ -26,8 +26,8 @@ pub fn concentric_square(point: Vec2) -> [f32; 2] {
     [x, y].map(|at| (0.5 * (at + 1.0)).clamp(0.0, ONE_MINUS_EPSILON))
 }
 
-/// Direction of the upper hemisphere with density [`cosine_hemisphere_pdf`]. Never on the horizon, where the
-/// density is zero: z² is at least the rounding of 1 - x² - y².
+/// Direction of the upper hemisphere with density cos θ / π. Never on the horizon, where the density is zero:
+/// z² is at least the rounding of 1 - x² - y².
 #[inline]
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     lanes::cosine_hemisphere(u).into()

@@ -111,7 +111,7 @@ impl Material {
         }
     }
 
-    /// Diffuse surface that emits `radiance` from its front.
+    /// Black surface that emits `radiance` from its front, where its corners go counter-clockwise.
     pub const fn lamp(radiance: Rgb) -> Self {
         let emission = ColorInput { value: radiance, texture: None };
         Self { emission, ..Self::diffuse(Rgb::ZERO) }

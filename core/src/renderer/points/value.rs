@@ -13,7 +13,7 @@ pub struct PointSettings {
     pub seed: u32,
     /// Most segments of a path; 2 is direct light. `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Highest instruction set to use. [`Level::BASELINE`] gives the same bits on every target.
+    /// Highest instruction set to use, by default that of [`Level::detect`]. The bits are the same by all.
     pub level: Level,
     /// Part of the points to estimate, in tiles of 256 near points.
     pub shard: Shard,
@@ -43,7 +43,7 @@ pub struct PointIrradiance {
     pub irradiance: Rgb,
     /// Lower end of the 95 % interval of its luminance.
     pub lower: f32,
-    /// Upper end; infinite below two samples.
+    /// Upper end of that interval; infinite below two samples.
     pub upper: f32,
     /// Number of samples.
     pub samples: u32,
