@@ -1,4 +1,4 @@
-//! The halflight app: loads scenes, renders them with all processors, saves pictures and reports.
+//! Loading of scenes, renders with all processors, pictures and reports in files: the library of the program.
 //!
 //! [`Renderer`] owns a loaded scene, its hierarchy, lights and threads, and renders many views of it.
 //! [`load`] reads scenes from files, [`load::SceneParts`] makes them from arrays, [`render`] has the settings
@@ -15,6 +15,34 @@
 //! save::write("cornell.png".as_ref(), &picture.image)?;
 //! if let Some(error) = picture.error {
 //!     println!("relMSE {:.1e}, 95 %: {:.1e} to {:.1e}", error.relmse, error.lower, error.upper);
+//! }
+//! # Ok::<(), halflight::Error>(())
+//! ```
+//!
+//! # Many views, and irradiance at sensors
+//!
+//! Views and sensors have the coordinates of the scene's files. All share one build.
+//!
+//! ```no_run
+//! use halflight::Renderer;
+//! use halflight::bake::{BakeSettings, Sensor};
+//! use halflight::load::View;
+//! use halflight::render::{Settings, Stop};
+//!
+//! let renderer = Renderer::open("scenes/cornell/cornell.obj")?;
+//! let settings = Settings { stop: Stop { spp: Some(64), ..Stop::default() }, ..Settings::default() };
+//! for x in [-0.2, 0.0, 0.2] {
+//!     let view = View { eye: [x, 1.0, 3.5], look_at: [0.0, 1.0, 0.0], up: [0.0, 1.0, 0.0] };
+//!     let camera = renderer.camera(view, 40.0).expect("eye and target differ");
+//!     let picture = renderer.render_view(camera, &settings)?;
+//!     println!("mean radiance {:?}", picture.image.mean());
+//! }
+//!
+//! let sensors = [Sensor { position: [0.0, 0.0, 0.0], normal: [0.0, 1.0, 0.0] }];
+//! let stop = Stop { error: Some(0.02), ..Stop::default() };
+//! let baked = renderer.irradiance_at(&sensors, &BakeSettings { stop, ..BakeSettings::default() })?;
+//! for point in baked.values {
+//!     println!("{} W/m², 95 %: {} to {}", point.value(), point.lower, point.upper);
 //! }
 //! # Ok::<(), halflight::Error>(())
 //! ```

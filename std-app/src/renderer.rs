@@ -1,6 +1,6 @@
 //! Renderer of a loaded scene: one build for many views.
 
-use crate::bake::{BakeSettings, Baked};
+use crate::bake::{BakeSettings, Baked, Sensor};
 use crate::error::Error;
 use crate::load::{self, LoadOptions, LoadedScene, SceneViews, View};
 use crate::render::{
@@ -98,7 +98,14 @@ impl Renderer {
     /// # Errors
     /// Those of [`crate::render::render`].
     pub fn render(&self, settings: &Settings) -> Result<RenderResult, Error> {
-        let camera = self.scene().camera_or_default();
+        self.render_view(self.scene().camera_or_default(), settings)
+    }
+
+    /// Renders the view of `camera`, mostly one of [`Renderer::camera`].
+    ///
+    /// # Errors
+    /// Those of [`crate::render::render`].
+    pub fn render_view(&self, camera: Camera, settings: &Settings) -> Result<RenderResult, Error> {
         self.render_with(camera, settings, &mut |_| {}, &AtomicBool::new(false))
     }
 
@@ -120,7 +127,17 @@ impl Renderer {
         Ok(Request::open(&scene, settings)?.render(built, &pool, progress, interrupt)?)
     }
 
-    /// Irradiance of `points`, with intervals.
+    /// Irradiance of `sensors`, which have the coordinates of the files, with intervals.
+    ///
+    /// # Errors
+    /// Those of [`crate::bake::irradiance`].
+    pub fn irradiance_at(&self, sensors: &[Sensor], settings: &BakeSettings) -> Result<Baked, Error> {
+        let points: Vec<_> = sensors.iter().map(|sensor| sensor.point(self.scene())).collect();
+        self.irradiance(&points, settings)
+    }
+
+    /// Irradiance of `points`, with intervals. The points have the coordinates of the core, in which the
+    /// scene is centred and scaled: [`crate::bake::vertices`] and [`Sensor::point`] give them.
     ///
     /// # Errors
     /// Those of [`crate::bake::irradiance`].

@@ -2,6 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use halflight::Renderer;
+use halflight::bake::{BakeSettings, Sensor};
 use halflight::load::{LoadOptions, PartMesh, SceneParts, View, load};
 use halflight::render::{self, Ending, Method, Reconstruct, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
@@ -78,6 +79,25 @@ fn the_last_picture_of_the_progress_is_the_result_and_a_flag_ends_the_render() {
     let result = result.unwrap();
     assert_eq!(result.ending, Ending::Interrupted);
     assert!(result.spp < 1 << 20 && last == Some(result.image));
+}
+
+#[test]
+fn sensors_have_the_coordinates_of_the_files() {
+    let mut parts = SceneParts::default();
+    let lamp = parts.material("lamp", Material::lamp(Rgb::splat(10.0)));
+    // A square of side 1 above two sensors, far from the origin.
+    let positions = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]].map(|[x, z]| [100.0 + x, 2.0, z]);
+    let mesh = PartMesh { positions: &positions, triangles: &[[0, 1, 2], [0, 2, 3]], ..PartMesh::default() };
+    parts.mesh("lamp", &mesh, lamp).unwrap();
+    let renderer = Renderer::new(parts.build().unwrap(), None).unwrap();
+    let sensors = [100.0, 101.0].map(|x| Sensor { position: [x, 0.0, 0.0], normal: [0.0, 1.0, 0.0] });
+    let stop = Stop { spp: Some(1024), ..Stop::default() };
+    let settings = BakeSettings { stop, ..BakeSettings::default() };
+    let baked = renderer.irradiance_at(&sensors, &settings).unwrap();
+    // Form factor of the square times π and its radiance, within twice the half-width of the interval.
+    for (point, exact) in baked.values.iter().zip([2.3084, 1.5558]) {
+        assert!((point.value() - exact).abs() <= point.upper - point.lower, "{point:?}, exact {exact}");
+    }
 }
 
 /// A square of side 2 at height 0, seen from a point light at height 2 above its middle.

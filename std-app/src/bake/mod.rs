@@ -1,5 +1,6 @@
 //! Irradiance at points of a scene, each value with its interval: memory, threads, time and stop rules around
-//! [`halflight_core::IrradianceRenderer`].
+//! [`halflight_core::IrradianceRenderer`]. [`crate::Renderer::irradiance_at`] needs a loaded scene
+//! and [`Sensor`]s alone.
 
 mod charts;
 mod grid;
@@ -16,6 +17,7 @@ mod table;
 mod tilted;
 
 pub use crate::render::{BakeProgress, BakeSettings, Baked};
+pub use halflight_core::IrradiancePoint;
 pub use lightmap::{Lightmap, LightmapError, LightmapSettings};
 pub use map::{LightMap, Texel, check as check_format};
 pub use merge::{MergedBake, attachment, is_bake, merge};
@@ -27,7 +29,6 @@ pub use table::{Quantity, TableFormat, write_table};
 use crate::memory::Budget;
 use crate::render::{Built, BuiltMemory, Pool, RenderError, scene_bytes, with_points};
 use core::sync::atomic::AtomicBool;
-use halflight_core::IrradiancePoint;
 use halflight_core::scene::Scene;
 
 /// Estimates the irradiance of `points` until a rule of `settings.stop` holds or `interrupt` is raised.

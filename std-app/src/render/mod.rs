@@ -276,7 +276,8 @@ pub struct RenderResult {
     /// Pixels without samples at an early end, filled from their surroundings.
     pub filled_pixels: u64,
     /// Error from the two half-films, plus bias by the audit or photon blur; `None` with fewer than four
-    /// samples or for a black picture.
+    /// samples, and for a black picture unless a pilot has estimated the light that it lacks: an error of 0
+    /// is one of a view without light.
     pub error: Option<ErrorEstimate>,
     /// Noise and photon blur, if there are photons and no audit.
     pub noise_and_blur: Option<NoiseAndBlur>,
