@@ -61,22 +61,25 @@ pub(super) const fn nodes_of(references: usize) -> usize {
 const PARALLEL_MIN: usize = 4096;
 
 /// Depth from which ranges are halved by count, which ends within 28 more levels.
-const HALVING_DEPTH: usize = DEPTH_MAX - 32;
+pub(super) const HALVING_DEPTH: usize = DEPTH_MAX - 32;
 
-/// Sorts `references` and fills `nodes`, which has the length of [`nodes_of`].
+/// Sorts `references` and fills `nodes`, which has the length of [`nodes_of`]. Ranges are halved from
+/// `halving_depth` on, usually [`HALVING_DEPTH`].
 pub(super) fn build<J: ForkJoin>(
     level: Level,
     references: &mut [Reference],
     nodes: &mut [BinaryNode],
+    halving_depth: usize,
     join: &J,
 ) {
     let extent = Extent::of(references);
-    Division { level, join }.subtree(references, nodes, &extent, 0);
+    Division { level, halving_depth, join }.subtree(references, nodes, &extent, 0);
 }
 
 /// Recursive division of ranges.
 struct Division<'j, J> {
     level: Level,
+    halving_depth: usize,
     join: &'j J,
 }
 
@@ -89,7 +92,7 @@ impl<J: ForkJoin> Division<'_, J> {
             return;
         }
         let (mid, left, right) =
-            if depth < HALVING_DEPTH { divide(self.level, references, extent) } else { halve(references) };
+            if depth < self.halving_depth { divide(self.level, references, extent) } else { halve(references) };
         let (left_references, right_references) = references.split_at_mut(mid);
         let (left_nodes, right_nodes) = below.split_at_mut(nodes_of(mid).min(below.len()));
         let mut on_the_left = || self.subtree(left_references, left_nodes, &left, depth + 1);

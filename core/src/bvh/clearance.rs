@@ -6,7 +6,7 @@
 //! the opposite answers are not, and rays may refute them.
 
 use super::Bvh;
-use super::layout::{Node, WIDTH};
+use super::layout::{Child, Node, WIDTH};
 use super::leaf::corners_of;
 use crate::geometry::Frame;
 use glam::Vec3;
@@ -98,38 +98,100 @@ impl Bvh<'_> {
     /// the stack overflows, so that triangles are missing.
     #[inline(always)]
     pub(crate) fn overlapping(&self, lo: Vec3, hi: Vec3, visitor: &mut impl BoxVisitor) -> bool {
+        let mut search = Search { bvh: self, visitor, goes_on: true, is_whole: true };
+        search.below(self.root, [lo, hi]);
+        search.is_whole
+    }
+}
+
+/// Search of the triangles in a box.
+struct Search<'s, 'm, V> {
+    bvh: &'s Bvh<'m>,
+    visitor: &'s mut V,
+    /// False once no triangle is of interest.
+    goes_on: bool,
+    /// False once the stack has overflowed.
+    is_whole: bool,
+}
+
+impl<V: BoxVisitor> Search<'_, '_, V> {
+    /// Searches the tree below a node in world space.
+    #[inline(always)]
+    fn below(&mut self, root: Child, [lo, hi]: [Vec3; 2]) {
         let mut waiting = [0u32; STACK_SIZE];
+        waiting[0] = root.0;
         let mut count = 1usize;
-        let (mut goes_on, mut is_whole) = (true, true);
         while let Some(&index) = count.checked_sub(1).and_then(|last| waiting.get(last)) {
             count -= 1;
-            let Some(node) = self.nodes.get(index as usize) else { break };
+            let Some(node) = self.bvh.nodes.get(index as usize) else {
+                self.below_entry(Child(index), [lo, hi]);
+                if self.goes_on && self.is_whole { continue } else { break }
+            };
             let mut met = overlapping(node, lo, hi);
             while met != 0 {
                 let lane = met.trailing_zeros() as usize;
                 let child = node.child(lane);
                 met &= met - 1;
-                if !visitor.enters(&|| node.corners(lane)) {
+                if !self.visitor.enters(&|| node.corners(lane)) {
                     continue;
                 }
                 if child.is_leaf() {
-                    let (first, of) = child.triangles();
-                    let runs = self.coordinates.get(9 * first..9 * (first + of)).unwrap_or(&[]);
-                    for i in 0..of {
-                        goes_on &= visitor.visit(corners_of(runs, of, i).map(Vec3::from));
-                    }
+                    self.leaf(child, |corners| corners.map(Vec3::from));
                 } else if let Some(slot) = waiting.get_mut(count) {
                     *slot = child.0;
                     count += 1;
                 } else {
-                    is_whole = false;
+                    self.is_whole = false;
                 }
             }
-            if !(goes_on && is_whole) {
+            if !(self.goes_on && self.is_whole) {
                 break;
             }
         }
-        is_whole
+    }
+
+    /// Searches an instance. Its nodes are compared in the space of the prototype with a box around the box.
+    #[inline(never)]
+    fn below_entry(&mut self, entry: Child, [lo, hi]: [Vec3; 2]) {
+        let Some(entry) = self.bvh.entry_of(entry) else { return };
+        let (lo, hi) = entry.local_box(lo, hi);
+        let mut waiting = [0u32; STACK_SIZE];
+        waiting[0] = entry.root().0;
+        let mut count = 1usize;
+        while let Some(&index) = count.checked_sub(1).and_then(|last| waiting.get(last)) {
+            count -= 1;
+            let Some(node) = self.bvh.nodes.get(index as usize) else {
+                if Child(index).is_leaf() {
+                    self.leaf(Child(index), |corners| entry.corners(corners));
+                }
+                continue;
+            };
+            let mut met = overlapping(node, lo, hi);
+            while met != 0 {
+                let child = node.child(met.trailing_zeros() as usize);
+                met &= met - 1;
+                match waiting.get_mut(count) {
+                    Some(slot) => {
+                        *slot = child.0;
+                        count += 1;
+                    }
+                    None => self.is_whole = false,
+                }
+            }
+            if !(self.goes_on && self.is_whole) {
+                break;
+            }
+        }
+    }
+
+    /// Visits the triangles of a leaf, whose corners `placed` brings into world space.
+    #[inline(always)]
+    fn leaf(&mut self, leaf: Child, placed: impl Fn([[f32; 3]; 3]) -> [Vec3; 3]) {
+        let (first, of) = leaf.triangles();
+        let runs = self.bvh.coordinates.get(9 * first..9 * (first + of)).unwrap_or(&[]);
+        for i in 0..of {
+            self.goes_on &= self.visitor.visit(placed(corners_of(runs, of, i)));
+        }
     }
 }
 

@@ -86,10 +86,14 @@ pub(super) struct Emitter<'a> {
 }
 
 impl Emitter<'_> {
-    /// Writes the whole tree; `false` if it does not fit.
-    pub(super) fn emit(&self, out: &mut Output) -> bool {
-        out.used = (0, 0);
-        self.node(0, 0, out).is_some()
+    /// Writes the whole tree after the used part, and returns its root; `None` if it does not fit.
+    pub(super) fn emit(&self, out: &mut Output) -> Option<Child> {
+        let before = out.used;
+        let root = self.node(0, 0, out);
+        if root.is_none() {
+            out.used = before;
+        }
+        root.map(Child::node)
     }
 
     /// Writes the wide node of binary node `index` and its subtree. The child of the least cost per area

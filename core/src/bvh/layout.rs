@@ -109,7 +109,7 @@ impl Child {
     /// A leaf out of range, for empty boxes and the bottom of a stack.
     pub(super) const NONE: Child = Child(u32::MAX);
 
-    pub(super) fn node(index: u32) -> Self {
+    pub(super) const fn node(index: u32) -> Self {
         Child(index)
     }
 

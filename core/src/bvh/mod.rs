@@ -8,6 +8,7 @@ mod build;
 pub mod clearance;
 mod collapse;
 mod fork_join;
+mod instances;
 mod layout;
 mod leaf;
 mod packet;
@@ -15,6 +16,7 @@ mod query;
 mod references;
 mod split;
 mod stream;
+mod top;
 mod traversal_ray;
 mod walk;
 
@@ -25,8 +27,9 @@ use crate::geometry::{Bounds, Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
 use batch::{Stream, Tiles};
+use instances::Entry;
 use halflight_simd::{Kernel, Simd};
-use layout::Node;
+use layout::{Child, Node};
 use query::{Nearest, Occluded};
 
 /// Coherence of the rays of a batch.
@@ -46,6 +49,10 @@ pub struct Bvh<'m> {
     coordinates: &'m [f32],
     /// Index in the mesh of each triangle in the leaves.
     triangles: &'m [u32],
+    /// Instances that rays enter; usually none.
+    entries: &'m [Entry],
+    /// The node that all rays begin with.
+    root: Child,
     bounds: Bounds,
     /// Margin of the boxes.
     slack: f32,
@@ -63,10 +70,20 @@ impl<'m> Bvh<'m> {
         build::kept_footprint(triangles)
     }
 
+    /// [`Bvh::footprint`] of a mesh, with its instances.
+    pub fn footprint_of(mesh: &Mesh) -> Footprint {
+        build::kept_footprint_of(mesh).and(build::working_footprint_of(mesh))
+    }
+
+    /// [`Bvh::kept_footprint`] of a mesh, with its instances.
+    pub fn kept_footprint_of(mesh: &Mesh) -> Footprint {
+        build::kept_footprint_of(mesh)
+    }
+
     /// Builds over `mesh` on one core at the baseline level.
     ///
     /// # Errors
-    /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
+    /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint_of`] the mesh.
     pub fn build(mesh: &Mesh, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         build::build(mesh, arena, Level::BASELINE, &Serial)
     }
@@ -74,7 +91,7 @@ impl<'m> Bvh<'m> {
     /// Builds over `mesh` at `level` on the cores of `join`; the tree is the same to the bit.
     ///
     /// # Errors
-    /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
+    /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint_of`] the mesh.
     pub fn build_with<J: ForkJoin>(
         mesh: &Mesh,
         arena: &mut Arena<'m>,
@@ -90,6 +107,7 @@ impl<'m> Bvh<'m> {
             .slice::<Node>(self.nodes.len())
             .slice::<f32>(self.coordinates.len())
             .slice::<u32>(self.triangles.len())
+            .slice::<Entry>(self.entries.len())
     }
 
     /// Copy in another arena, of exactly [`Bvh::used`] bytes, so that the memory of the build can be freed.
@@ -100,10 +118,12 @@ impl<'m> Bvh<'m> {
         let nodes = arena.slice(self.nodes.len())?;
         let coordinates = arena.slice(self.coordinates.len())?;
         let triangles = arena.slice(self.triangles.len())?;
+        let entries = arena.slice(self.entries.len())?;
+        entries.copy_from_slice(self.entries);
         nodes.copy_from_slice(self.nodes);
         coordinates.copy_from_slice(self.coordinates);
         triangles.copy_from_slice(self.triangles);
-        Ok(Bvh { nodes, coordinates, triangles, ..*self })
+        Ok(Bvh { nodes, coordinates, triangles, entries, ..*self })
     }
 
     /// Bounding box of all triangles that a ray can hit.
@@ -125,8 +145,8 @@ impl<'m> Bvh<'m> {
     pub fn nearest_batch(&self, level: Level, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         let sink = Nearest(hits);
         match coherence {
-            Coherence::Coherent => level.dispatch(Tiles { bvh: self, rays, sink }),
-            Coherence::Incoherent => level.dispatch(Stream::<_, false> { bvh: self, rays, sink }),
+            Coherence::Coherent if self.entries.is_empty() => level.dispatch(Tiles { bvh: self, rays, sink }),
+            _ => level.dispatch(Stream::<_, false> { bvh: self, rays, sink }),
         }
     }
 
@@ -154,3 +174,5 @@ impl<const ANY: bool> Kernel for Single<'_, '_, ANY> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod instance_tests;

@@ -242,7 +242,7 @@ impl<S: Simd> Walk<'_, S> {
     ) {
         let mut t_max = self.farthest();
         stack.truncate(0);
-        let (mut child, mut place) = (Child::node(0), 0);
+        let (mut child, mut place) = (bvh.root, 0);
         loop {
             if !child.is_leaf() {
                 let Some(node) = bvh.nodes.get(child.0 as usize) else { return };

@@ -12,6 +12,7 @@
 //!    so). Near boxes first was slower.
 
 use super::Bvh;
+use super::instances::Outside;
 use super::layout::Child;
 use super::leaf::{meets_on_edge, take};
 use super::query::Sink;
@@ -34,10 +35,12 @@ const PREFETCH_DISTANCE: usize = 64;
 struct Slot {
     ray: TraversalRay,
     hit: Hit,
+    /// In the padding of the slot.
+    outside: Outside,
 }
 
 impl Slot {
-    const EMPTY: Slot = Slot { ray: TraversalRay::NONE, hit: Hit::NONE };
+    const EMPTY: Slot = Slot { ray: TraversalRay::NONE, hit: Hit::NONE, outside: Outside::WORLD };
 }
 
 /// Entry at the bottom of every stack.
@@ -109,7 +112,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
 
         let mut vacant = done & !empty;
         while let Some(i) = pop(&mut vacant) {
-            let (Slot { ray, hit }, stack) = (&mut slots[i], &mut stacks[i]);
+            let (Slot { ray, hit, .. }, stack) = (&mut slots[i], &mut stacks[i]);
             sink.put(ray.index, *hit);
             match queue.next() {
                 Some(traversal_ray) => *ray = *traversal_ray,
@@ -120,7 +123,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             }
             *hit = Hit::NONE;
             stack.restart(DONE.0);
-            next[i] = Child::node(0).0;
+            next[i] = bvh.root.0;
             nodes |= 1 << i;
         }
         if nodes | leaves == 0 {
@@ -128,8 +131,13 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
         }
 
         while let Some(i) = pop(&mut nodes) {
-            let (Slot { ray, .. }, stack) = (&mut slots[i], &mut stacks[i]);
-            let Some(node) = bvh.nodes.get(next[i] as usize) else { return };
+            let (Slot { ray, hit, outside }, stack) = (&mut slots[i], &mut stacks[i]);
+            let Some(node) = bvh.nodes.get(next[i] as usize) else {
+                let Some(world) = queue.rays.get(ray.index as usize) else { return };
+                bvh.cross(Child(next[i]), world, (ray, hit), outside, stack);
+                next[i] = take_next::<S, ANY>(simd, bvh, stack);
+                continue;
+            };
             let (entry, exit) = ray.slab8(simd).interval(simd, &node.rows, ray.t_max);
             if ANY {
                 simd.push8_unordered(entry, exit, &node.rows[6], stack);
@@ -141,7 +149,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
 
         let (mut at_leaf, mut met) = (leaves, 0u32);
         while let Some(i) = pop(&mut at_leaf) {
-            let (Slot { ray, hit }, stack) = (&mut slots[i], &mut stacks[i]);
+            let (Slot { ray, hit, .. }, stack) = (&mut slots[i], &mut stacks[i]);
             let leaf = Child(next[i]);
             let (first, count) = leaf.triangles();
             let Some(areas) = ray.shear8(simd).areas(simd, bvh.coordinates, 9 * first, count, ray.t_max)
@@ -166,7 +174,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             continue;
         }
         while let Some(i) = pop(&mut met) {
-            let (Slot { ray, hit }, stack) = (&mut slots[i], &mut stacks[i]);
+            let (Slot { ray, hit, .. }, stack) = (&mut slots[i], &mut stacks[i]);
             take(simd, bvh, ray, Child(next[i]), &found[i], hit);
             if hit.is_some() {
                 ray.t_max = hit.t;

@@ -9,13 +9,13 @@ use glam::Vec3;
 use halflight_test_support::Random;
 use std::vec::Vec;
 
-struct Soup {
-    positions: Vec<[f32; 3]>,
-    triangles: Vec<Triangle>,
+pub(super) struct Soup {
+    pub(super) positions: Vec<[f32; 3]>,
+    pub(super) triangles: Vec<Triangle>,
 }
 
 impl Soup {
-    fn of(corners: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
+    pub(super) fn of(corners: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
         let mut soup = Soup { positions: Vec::new(), triangles: Vec::new() };
         for triangle in corners {
             let first = soup.positions.len() as u32;
@@ -24,16 +24,16 @@ impl Soup {
         }
         soup
     }
-    fn mesh(&self) -> Mesh<'_> {
+    pub(super) fn mesh(&self) -> Mesh<'_> {
         Mesh { positions: &self.positions, triangles: &self.triangles, ..Mesh::default() }
     }
 }
 
-fn lines(bytes: usize) -> Vec<Line> {
+pub(super) fn lines(bytes: usize) -> Vec<Line> {
     std::vec![Line([0xa5; 64]); bytes.div_ceil(64)]
 }
 
-fn random_soup(count: usize, size: f32, offset: Vec3) -> Soup {
+pub(super) fn random_soup(count: usize, size: f32, offset: Vec3) -> Soup {
     let mut random = Random(count as u64);
     Soup::of((0..count).map(|_| {
         let middle = (random.point() - 0.5) * 10.0;
@@ -42,7 +42,7 @@ fn random_soup(count: usize, size: f32, offset: Vec3) -> Soup {
 }
 
 /// Wavy sheet of triangles that share edges, so that every ray through it must hit.
-fn sheet(n: usize) -> Soup {
+pub(super) fn sheet(n: usize) -> Soup {
     let at = |x: usize, z: usize| {
         let (x, z) = (x as f32 / n as f32 * 2.0 - 1.0, z as f32 / n as f32 * 2.0 - 1.0);
         Vec3::new(x, 0.1 * (x * x - z * z), z)
@@ -83,7 +83,7 @@ fn agrees(soup: &Soup, rays: &[Ray]) {
     }
 }
 
-fn random_rays(count: usize, offset: Vec3) -> Vec<Ray> {
+pub(super) fn random_rays(count: usize, offset: Vec3) -> Vec<Ray> {
     let mut random = Random(99);
     (0..count)
         .map(|i| {
@@ -266,7 +266,7 @@ fn a_copy_takes_exactly_what_it_says() {
 }
 
 /// Points of a clearance query, in radii.
-const POINTS_ASIDE: [[f32; POINTS]; 2] =
+pub(super) const POINTS_ASIDE: [[f32; POINTS]; 2] =
     [[0.6, 0.0, -0.6, 0.0, 0.4, -0.4, 0.3, -0.1], [0.0, 0.6, 0.0, -0.6, 0.4, 0.4, -0.5, 0.0]];
 
 #[test]

@@ -10,6 +10,7 @@
 //!    still entered: the hit does not depend on the order of traversal.
 
 use super::Bvh;
+use super::instances::Outside;
 use super::layout::Child;
 use super::leaf::take;
 use super::traversal_ray::{TraversalRay, traceable};
@@ -24,14 +25,19 @@ pub(super) fn trace<S: Simd, const ANY: bool>(simd: S, bvh: &Bvh, ray: &Ray) -> 
     if !traceable(ray) {
         return best;
     }
+    let (world, mut outside) = (ray, Outside::WORLD);
     let mut ray = TraversalRay::new(ray, 0);
-    let (slab, shear) = (ray.slab8(simd), ray.shear8(simd));
+    let (mut slab, mut shear) = (ray.slab8(simd), ray.shear8(simd));
     let mut stack = Stack::new();
-    stack.restart(Child::node(0).0);
+    stack.restart(bvh.root.0);
     while let Some(bits) = stack.pop() {
         let child = Child(bits);
         if !child.is_leaf() {
-            let Some(node) = bvh.nodes.get(child.0 as usize) else { break };
+            let Some(node) = bvh.nodes.get(child.0 as usize) else {
+                bvh.cross(child, world, (&mut ray, &mut best), &mut outside, &mut stack);
+                (slab, shear) = (ray.slab8(simd), ray.shear8(simd));
+                continue;
+            };
             let (entry, exit) = slab.interval(simd, &node.rows, ray.t_max);
             simd.push8(node.order_of(ray.octant()), entry, exit, &node.rows[6], &mut stack);
         } else {

@@ -38,8 +38,12 @@ pub enum EnvironmentKind {
 /// Counts of the triangles, materials and lights of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Census {
-    /// All triangles.
+    /// All triangles, those of instances included.
     pub triangles: u64,
+    /// Triangles in memory: those of a prototype count once. The counts below are of these.
+    pub unique_triangles: u64,
+    /// Instances.
+    pub instances: u64,
     /// Triangles without area, which are never hit.
     pub degenerate: u64,
     /// Materials of the scene, used or not.
@@ -76,7 +80,9 @@ impl Census {
     /// Census of `scene`.
     pub fn of(scene: &Scene) -> Census {
         let mut census = Census {
-            triangles: scene.mesh.triangles.len() as u64,
+            triangles: scene.mesh.triangle_count(),
+            unique_triangles: scene.mesh.unique_triangles() as u64,
+            instances: scene.mesh.instances.placed.len() as u64,
             materials: scene.materials.len() as u64,
             textures: scene.textures.len() as u64,
             thin_lens: scene.camera.lens_radius > 0.0,
@@ -94,11 +100,23 @@ impl Census {
                 PointLight::Directional { .. } => census.directional_lights += 1,
             }
         }
-        let bounds = Bounds::around(scene.mesh.positions.iter().map(|&p| p.into()));
+        let bounds = match scene.mesh.instances.is_empty() {
+            true => Bounds::around(scene.mesh.positions.iter().map(|&p| p.into())),
+            false => scene.mesh.bounds(),
+        };
         for (index, triangle) in scene.mesh.triangles.iter().enumerate() {
             if let Some(material) = scene.materials.get(triangle.material as usize) {
                 let corners = scene.mesh.corners(index as u32);
                 census.count_triangle(material, corners, &bounds, scene.camera.eye);
+            }
+        }
+        let instances = &scene.mesh.instances;
+        for prototype in (0..instances.prototypes.len() as u32).map(|number| instances.prototype(number)) {
+            for (index, triangle) in prototype.triangles.iter().enumerate() {
+                if let Some(material) = scene.materials.get(triangle.material as usize) {
+                    let corners = prototype.corners(index as u32);
+                    census.count_triangle(material, corners, &bounds, scene.camera.eye);
+                }
             }
         }
         census

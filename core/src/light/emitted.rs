@@ -14,8 +14,7 @@ const TEXTURE_SAMPLES: u32 = 16;
 /// Radiance that `triangle` emits at texture coordinates `uv`, to its front or its back.
 #[inline]
 pub fn emitted(scene: &Scene, triangle: u32, uv: Vec2, front: bool) -> Rgb {
-    let material = scene.mesh.triangles.get(triangle as usize).map(|t| t.material as usize);
-    match material.and_then(|m| scene.materials.get(m)) {
+    match scene.mesh.material(triangle).and_then(|material| scene.materials.get(material as usize)) {
         Some(material) if front || material.two_sided => {
             // Textures may hold negative numbers; radiance may not.
             material.emission.at::<All>(scene, uv).max(Rgb::ZERO)
@@ -55,7 +54,7 @@ pub(super) fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
 }
 
 fn material_of<'s>(scene: &'s Scene, triangle: u32) -> Option<&'s Material> {
-    scene.materials.get(scene.mesh.triangles.get(triangle as usize)?.material as usize)
+    scene.materials.get(scene.mesh.material(triangle)? as usize)
 }
 
 /// Luminance of the intensity or irradiance; zero if not finite.

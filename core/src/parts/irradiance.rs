@@ -63,7 +63,7 @@ impl<'a> IrradianceSampler<'a> {
     /// Bytes that [`IrradianceSampler::new`] needs.
     pub fn required_memory(scene: &Scene) -> usize {
         let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
-        Bvh::footprint(scene.mesh.triangles.len()).and(lights).bytes()
+        Bvh::footprint_of(&scene.mesh).and(lights).bytes()
     }
 
     /// Builds the hierarchy and the lights of `scene`, whose camera is of no matter.

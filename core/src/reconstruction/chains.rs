@@ -232,12 +232,12 @@ impl<'a, F: Features> Chains<'a, F> {
             }
             Surface::Dielectric { .. } | Surface::Mirror { .. } | Surface::Pane { .. } => false,
         };
-        self.context.scene.mesh.normals.is_empty() && material.normal_map.is_none() && !is_textured
+        !self.context.scene.mesh.has_normals() && material.normal_map.is_none() && !is_textured
     }
 
     fn material(&self, hit: &Hit) -> Option<&'a Material> {
-        let triangle = self.context.scene.mesh.triangles.get(hit.triangle as usize)?;
-        self.context.scene.materials.get(triangle.material as usize)
+        let material = self.context.scene.mesh.material(hit.triangle)?;
+        self.context.scene.materials.get(material as usize)
     }
 
     fn escape(&self, seen: &mut Seen) -> Step {

@@ -13,7 +13,7 @@
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::mix;
-use crate::scene::{Mesh, Triangle};
+use crate::scene::{Instances, Mesh, Triangle};
 use glam::Vec3;
 
 /// Cosine of 20°, the largest angle between neighbours of one component.
@@ -27,53 +27,82 @@ const PLANE_NORMAL: f32 = 1e-3;
 /// Index of no vertex or triangle.
 const NONE: u32 = u32::MAX;
 
-/// Component of each triangle: the lowest index of its triangles.
+/// Component of each triangle: the lowest index of its triangles. Each instance has components of its own.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceComponents<'m> {
+    /// Components of the triangles in world space, then those of the prototypes, by index in their meshes.
     components: &'m [u32],
+    /// Number of triangles in world space.
+    in_world: usize,
+    instances: Instances<'m>,
+}
+
+/// The mesh without its instances, then the prototypes.
+fn parts<'a>(mesh: &Mesh<'a>) -> impl Iterator<Item = Mesh<'a>> {
+    let instances = mesh.instances;
+    let prototypes = (0..instances.prototypes.len() as u32).map(move |number| instances.prototype(number));
+    core::iter::once(Mesh { instances: Instances::NONE, ..*mesh }).chain(prototypes)
 }
 
 impl<'m> SurfaceComponents<'m> {
     /// Bytes that [`SurfaceComponents::build`] takes from the arena. [`SurfaceComponents::kept_footprint`]
     /// of them stay taken.
     pub fn footprint(mesh: &Mesh) -> Footprint {
-        let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
-        let weld = Footprint::default().slice::<u32>(slots(vertices));
-        let edges = Footprint::default()
-            .slice::<u32>(vertices.saturating_add(1))
-            .slice::<u32>(triangles.saturating_mul(3));
-        let planes = Footprint::default().slice::<u32>(slots(triangles));
-        let welded = Footprint::default().slice::<u32>(vertices);
-        Self::kept_footprint(mesh).and(welded.and(weld.or(edges)).or(planes))
+        let working = parts(mesh).map(|part| {
+            let (vertices, triangles) = (part.positions.len(), part.triangles.len());
+            let weld = Footprint::default().slice::<u32>(slots(vertices));
+            let edges = Footprint::default()
+                .slice::<u32>(vertices.saturating_add(1))
+                .slice::<u32>(triangles.saturating_mul(3));
+            let planes = Footprint::default().slice::<u32>(slots(triangles));
+            let welded = Footprint::default().slice::<u32>(vertices);
+            welded.and(weld.or(edges)).or(planes)
+        });
+        Self::kept_footprint(mesh).and(working.fold(Footprint::default(), Footprint::or))
     }
 
     /// Bytes that stay taken from the arena after [`SurfaceComponents::build`].
     pub fn kept_footprint(mesh: &Mesh) -> Footprint {
-        Footprint::default().slice::<u32>(mesh.triangles.len())
+        Footprint::default().slice::<u32>(mesh.unique_triangles())
     }
 
     /// Components of the triangles of `mesh`.
     ///
     /// # Errors
     /// [`OutOfMemory`] if the arena has less than [`SurfaceComponents::footprint`].
-    pub fn build(mesh: &Mesh, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub fn build(mesh: &Mesh<'m>, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let needed = Self::footprint(mesh).bytes();
         if arena.available() < needed {
             return Err(OutOfMemory { needed, available: arena.available() });
         }
-        let components = arena.slice::<u32>(mesh.triangles.len())?;
-        let mut forest = Forest::new(components);
-        let extent = Bounds::around(mesh.positions.iter().map(|&p| p.into())).extent().max_element();
-        join_at_edges(mesh, &mut forest, &mut arena.scratch())?;
-        join_in_planes(mesh, extent, &mut forest, &mut arena.scratch())?;
-        forest.flatten();
-        Ok(Self { components })
+        let components = arena.slice::<u32>(mesh.unique_triangles())?;
+        let mut rest = &mut components[..];
+        for part in parts(mesh) {
+            let (own, others) = rest.split_at_mut(part.triangles.len().min(rest.len()));
+            rest = others;
+            let mut forest = Forest::new(own);
+            let extent = Bounds::around(part.positions.iter().map(|&p| p.into())).extent().max_element();
+            join_at_edges(&part, &mut forest, &mut arena.scratch())?;
+            join_in_planes(&part, extent, &mut forest, &mut arena.scratch())?;
+            forest.flatten();
+        }
+        Ok(Self { components, in_world: mesh.triangles.len(), instances: mesh.instances })
     }
 
     /// Component of triangle `index`; the index itself if there is no such triangle.
     #[inline]
     pub fn of(&self, index: u32) -> u32 {
-        self.components.get(index as usize).copied().unwrap_or(index)
+        if (index as usize) < self.in_world {
+            return self.components.get(index as usize).copied().unwrap_or(index);
+        }
+        self.of_instance(index).unwrap_or(index)
+    }
+
+    fn of_instance(&self, index: u32) -> Option<u32> {
+        let instance = self.instances.instance_of(index)?;
+        let local = (index - instance.first_triangle()) as usize;
+        let first = self.in_world + self.instances.first_triangle_of(instance.prototype()) as usize;
+        Some(instance.first_triangle() + self.components.get(first + local)?)
     }
 }
 

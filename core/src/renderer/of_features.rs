@@ -53,7 +53,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         let options = settings.method.options();
         let kind = settings.method.kind();
         let [method, scratch] = MethodPlan::<F>::required_memory(kind, &options, (scene, settings.size));
-        let bvh = Bvh::footprint(scene.mesh.triangles.len());
+        let bvh = Bvh::footprint_of(&scene.mesh);
         let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let film = RenderState::footprint(width, height);
         // Prepasses may choose a biased method.

@@ -93,7 +93,7 @@ impl<'a> IrradianceRenderer<'a> {
     pub fn required_memory(scene: &Scene, points: usize) -> RequiredMemory {
         let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let structures =
-            Bvh::footprint(scene.mesh.triangles.len()).and(lights).and(Self::footprint(scene, points));
+            Bvh::footprint_of(&scene.mesh).and(lights).and(Self::footprint(scene, points));
         RequiredMemory { structures: structures.bytes(), scratch: Self::scratch().bytes() }
     }
 

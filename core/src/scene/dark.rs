@@ -55,7 +55,7 @@ fn is_bright(light: Rgb) -> bool {
 mod tests {
     use super::*;
     use crate::scene::{
-        Camera, ColorInput, Environment, Material, Mesh, Surface, Texels, Texture, TextureTransform,
+        Camera, ColorInput, Environment, Instances, Material, Mesh, Surface, Texels, Texture, TextureTransform,
         Triangle, Wrap,
     };
     use glam::Mat3;
@@ -67,6 +67,7 @@ mod tests {
             texcoords: &[],
             triangles: &[Triangle { vertices: [0, 1, 2], material: 0 }],
             overlaps: &[],
+            instances: Instances::NONE,
         },
         materials: &[],
         textures: &[],

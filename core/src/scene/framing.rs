@@ -35,8 +35,7 @@ impl Camera {
     /// Camera that frames all of `mesh`, looking along that of the six axis directions from which the largest
     /// area of surface is visible. An open box is seen through its opening, with either winding of its walls.
     pub fn framing(mesh: &Mesh) -> Camera {
-        let bounds =
-            Bounds::around(mesh.positions.iter().map(|&p| p.into()).filter(|p: &Vec3| p.is_finite()));
+        let bounds = mesh.bounds();
         if bounds.is_empty() {
             return Camera::look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, FIELD_OF_VIEW);
         }
@@ -60,8 +59,10 @@ fn visible_area(camera: &Camera, mesh: &Mesh, bounds: &Bounds) -> f32 {
     let half = 0.5 * GRID as f32;
     let focal = half / camera.tan_half_fov;
     let mut nearest = [(0.0f32, 0.0f32); GRID * GRID]; // (1 / depth, area)
-    for index in 0..mesh.triangles.len() as u32 {
-        let [a, b, c] = mesh.corners(index).map(|p| (p - camera.eye) / size);
+    let own = (0..mesh.triangles.len() as u32).map(|index| mesh.corners(index));
+    let of_boxes = mesh.instances.placed.iter().flat_map(|instance| sides(mesh.instances.bounds(instance)));
+    for corners in own.chain(of_boxes) {
+        let [a, b, c] = corners.map(|p| (p - camera.eye) / size);
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
         let height = normal.dot(a).abs();
         let inverse = [a, b, c].map(|v| 1.0 / v.dot(camera.forward));
@@ -93,6 +94,19 @@ fn visible_area(camera: &Camera, mesh: &Mesh, bounds: &Bounds) -> f32 {
         }
     }
     nearest.iter().map(|(_, area)| area).sum::<f32>() / (focal * focal)
+}
+
+/// The twelve triangles of a box, which stand for an instance.
+fn sides(bounds: Bounds) -> impl Iterator<Item = [Vec3; 3]> {
+    (0..12usize).map(move |i| {
+        let (axis, end, half) = (i % 3, i / 3 % 2, i / 6);
+        let corner = |u: usize, v: usize| {
+            let mut at = [0; 3];
+            (at[axis], at[(axis + 1) % 3], at[(axis + 2) % 3]) = (end, u, v);
+            Vec3::from([0, 1, 2].map(|k| [bounds.min, bounds.max][at[k]][k]))
+        };
+        [corner(0, 0), corner(1, 1), corner(half, 1 - half)]
+    })
 }
 
 fn in_front_of(bounds: &Bounds, forward: Vec3, up: Vec3) -> Camera {

@@ -1,6 +1,8 @@
 //! Indexed triangle mesh. Positions, normals and texture coordinates share one index per vertex.
 
+use super::instance::Instances;
 use super::overlap::Overlap;
+use crate::geometry::Bounds;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
@@ -27,11 +29,14 @@ pub struct Mesh<'a> {
     pub triangles: &'a [Triangle],
     /// Pairs of triangles that overlap in one plane, in both orders, ascending; or empty.
     pub overlaps: &'a [Overlap],
+    /// Meshes that are placed many times; usually none.
+    pub instances: Instances<'a>,
 }
 
 impl<'a> Mesh<'a> {
     /// Checks the indices. The error is the index of the first triangle with a vertex or material that does
-    /// not exist, or 0 if `normals` or `texcoords` are neither empty nor as long as `positions`.
+    /// not exist, or 0 if `normals` or `texcoords` are neither empty nor as long as `positions`, or if the
+    /// instances are broken.
     pub fn validate(&self, materials: usize) -> Result<(), usize> {
         let vertices = self.positions.len();
         let fits = |length: usize| length == 0 || length == vertices;
@@ -41,23 +46,70 @@ impl<'a> Mesh<'a> {
         let broken = |t: &Triangle| {
             t.vertices.iter().any(|&v| v as usize >= vertices) || t.material as usize >= materials
         };
-        self.triangles.iter().position(broken).map_or(Ok(()), Err)
+        self.triangles.iter().position(broken).map_or(Ok(()), Err)?;
+        let are_valid = self.instances.is_empty() || self.instances.are_valid(self.triangles.len(), materials);
+        if are_valid { Ok(()) } else { Err(0) }
     }
 
-    /// Corner positions of triangle `index`; zeros if the triangle or a vertex does not exist.
+    /// Number of triangles that rays meet: those in world space and those of all instances.
+    pub fn triangle_count(&self) -> u64 {
+        self.triangles.len() as u64 + self.instances.triangle_count()
+    }
+
+    /// Number of triangles in memory.
+    pub fn unique_triangles(&self) -> usize {
+        self.triangles.len() + if self.instances.is_empty() { 0 } else { self.instances.triangles.len() }
+    }
+
+    /// Bounds of all finite vertices in world space, and of all instances.
+    pub fn bounds(&self) -> Bounds {
+        let positions = self.positions.iter().map(|&p| Vec3::from(p));
+        let own = Bounds::around(positions.filter(|p| p.is_finite()));
+        let placed = self.instances.placed.iter().map(|instance| self.instances.bounds(instance));
+        placed.fold(own, Bounds::union)
+    }
+
+    /// True if some surface has shading normals.
+    #[inline]
+    pub fn has_normals(&self) -> bool {
+        !(self.normals.is_empty() && self.instances.normals.is_empty())
+    }
+
+    /// True if some triangles overlap in one plane.
+    #[inline]
+    pub fn has_overlaps(&self) -> bool {
+        !(self.overlaps.is_empty() && self.instances.overlaps.is_empty())
+    }
+
+    /// Material of triangle `index`, of the mesh or of an instance.
+    #[inline]
+    pub fn material(&self, index: u32) -> Option<u32> {
+        match self.triangles.get(index as usize) {
+            Some(triangle) => Some(triangle.material),
+            None => {
+                let (_, mesh, local) = self.instance_of(index)?;
+                Some(mesh.triangles.get(local as usize)?.material)
+            }
+        }
+    }
+
+    /// Corner positions of triangle `index` in world space; zeros if the triangle or a vertex does not exist.
     #[inline]
     pub fn corners(&self, index: u32) -> [Vec3; 3] {
-        self.vertices(index).map(|v| self.positions.get(v as usize).copied().unwrap_or_default().into())
+        let at = |v: u32| self.positions.get(v as usize).copied().unwrap_or_default().into();
+        match self.triangles.get(index as usize) {
+            Some(triangle) => triangle.vertices.map(at),
+            None => self.placed_triangle(index).map_or([Vec3::ZERO; 3], |t| t.positions.map(Vec3::from)),
+        }
     }
 
     /// Texture coordinates at the corners; zeros without any.
     #[inline]
     pub fn corner_texcoords(&self, index: u32) -> [Vec2; 3] {
-        self.vertices(index).map(|v| self.texcoords.get(v as usize).copied().unwrap_or_default().into())
-    }
-
-    #[inline]
-    fn vertices(&self, index: u32) -> [u32; 3] {
-        self.triangles.get(index as usize).map_or([u32::MAX; 3], |t| t.vertices)
+        let at = |v: u32| self.texcoords.get(v as usize).copied().unwrap_or_default().into();
+        match self.triangles.get(index as usize) {
+            Some(triangle) => triangle.vertices.map(at),
+            None => self.placed_triangle(index).map_or([Vec2::ZERO; 3], |t| t.texcoords.map(Vec2::from)),
+        }
     }
 }

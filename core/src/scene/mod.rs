@@ -6,6 +6,7 @@ mod class;
 mod dark;
 mod framing;
 mod input;
+mod instance;
 mod light;
 mod material;
 mod mesh;
@@ -16,6 +17,8 @@ mod texture;
 pub use camera::{Camera, Projection, StartPlane};
 pub(crate) use class::{CAUSTIC_ALPHA, SMOOTH_ALPHA};
 pub use input::{ColorInput, ScalarInput};
+pub use instance::{Instance, Instances, Prototype};
+pub(crate) use instance::{local_ray, placed};
 pub use light::{Environment, PointLight};
 pub use material::{Material, NormalMap, Surface};
 pub use mesh::{Mesh, Triangle};
@@ -27,7 +30,7 @@ pub use texture::{Texels, Texture, TextureId, TextureTransform, Wrap};
 /// Everything that a picture shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
-    /// All triangles, in one mesh, in world space.
+    /// All triangles: those in world space, in one mesh, and those of instances.
     pub mesh: Mesh<'a>,
     /// Indexed by [`Triangle::material`].
     pub materials: &'a [Material],

@@ -21,10 +21,15 @@ impl Scene<'_> {
     /// The visible hit where triangles overlap: one whose front faces the ray before the others, then a lamp,
     /// then one without cut-outs, then the first of the mesh.
     pub fn visible_hit(&self, ray: &Ray, hit: Hit) -> Hit {
-        let all = self.mesh.overlaps;
-        let first = all.partition_point(|overlap| overlap.triangle < hit.triangle);
+        // Triangles of an instance overlap others of the same instance.
+        let (all, local) = match self.mesh.instance_of(hit.triangle) {
+            None => (self.mesh.overlaps, hit.triangle),
+            Some((_, prototype, local)) => (prototype.overlaps, local),
+        };
+        let base = hit.triangle - local;
+        let first = all.partition_point(|overlap| overlap.triangle < local);
         let mut overlaps =
-            all.iter().skip(first).take_while(|overlap| overlap.triangle == hit.triangle).peekable();
+            all.iter().skip(first).take_while(|overlap| overlap.triangle == local).peekable();
         if overlaps.peek().is_none() {
             return hit;
         }
@@ -34,6 +39,7 @@ impl Scene<'_> {
             if is_front && !same_front {
                 continue;
             }
+            let other = base + other;
             let rank = self.rank(ray, other);
             if rank < best_rank {
                 let corners = self.mesh.corners(other).map(|p| p.to_array());
@@ -50,8 +56,7 @@ impl Scene<'_> {
     fn rank(&self, ray: &Ray, index: u32) -> (bool, bool, bool, u32) {
         let [a, b, c] = self.mesh.corners(index);
         let is_back = (b - a).cross(c - a).dot(Vec3::from(ray.direction)) > 0.0;
-        let triangle = self.mesh.triangles.get(index as usize);
-        let material = triangle.and_then(|t| self.materials.get(t.material as usize));
+        let material = self.mesh.material(index).and_then(|material| self.materials.get(material as usize));
         let is_lamp = material.is_some_and(|material| material.emits());
         (is_back, !is_lamp, material.is_some_and(|material| material.has_cutout()), index)
     }

@@ -2,7 +2,8 @@
 //! leave the surface without hitting it again. Blocks of them are computed in lanes, with the same bits
 //! (`halflight_simd::kernels::shade::surface`).
 
-use super::{Material, NormalMap, Scene};
+use super::instance::PlacedTriangle;
+use super::{Material, NormalMap, Scene, Triangle};
 use crate::features::Features;
 use crate::geometry::{Frame, Hit, Ray};
 use glam::{Vec2, Vec3};
@@ -36,9 +37,19 @@ impl<'a> SurfacePoint<'a> {
     #[inline]
     pub fn at<F: Features>(scene: &Scene<'a>, ray: &Ray, hit: &Hit) -> Option<Self> {
         let mesh = &scene.mesh;
-        let triangle = mesh.triangles.get(hit.triangle as usize)?;
+        let of_instance;
+        let (triangle, positions, normals, texcoords, more_error) =
+            match mesh.triangles.get(hit.triangle as usize) {
+                Some(triangle) => (*triangle, mesh.positions, mesh.normals, mesh.texcoords, 0.0),
+                None => {
+                    of_instance = mesh.placed_triangle(hit.triangle)?;
+                    let PlacedTriangle { positions, normals, texcoords, material, error } = &of_instance;
+                    let triangle = Triangle { vertices: [0, 1, 2], material: *material };
+                    (triangle, &positions[..], &normals[..], &texcoords[..], *error)
+                }
+            };
         let material = scene.materials.get(triangle.material as usize)?;
-        let [p0, p1, p2] = corners(mesh.positions, triangle.vertices)?;
+        let [p0, p1, p2] = corners(positions, triangle.vertices)?;
         let (u, v) = (hit.u, hit.v);
         let w = 1.0 - u - v;
         let position = w * p0 + u * p1 + v * p2;
@@ -48,14 +59,14 @@ impl<'a> SurfacePoint<'a> {
         // Scale-free: proportional to the coordinates and edges, without absolute terms.
         let coordinates = (w * p0.abs() + u * p1.abs() + v * p2.abs()).max_element();
         let reach = e1.abs().max(e2.abs()).max_element();
-        let error = ERROR_UNITS * (coordinates + reach * slenderness.min(MAX_SLENDERNESS));
+        let error = ERROR_UNITS * (coordinates + reach * slenderness.min(MAX_SLENDERNESS)) + more_error;
 
         let to_viewer = -Vec3::from(ray.direction);
         let front = normal.dot(to_viewer) >= 0.0;
 
         let mut shading = normal;
-        if !mesh.normals.is_empty() {
-            shading = interpolated_normal(mesh.normals, triangle.vertices, [w, u, v]).unwrap_or(normal);
+        if !normals.is_empty() {
+            shading = interpolated_normal(normals, triangle.vertices, [w, u, v]).unwrap_or(normal);
             // Flipped normals of a file still describe the curvature of the surface.
             if shading.dot(normal) < 0.0 {
                 shading = -shading;
@@ -64,7 +75,7 @@ impl<'a> SurfacePoint<'a> {
         let mut uv = Vec2::ZERO;
         let mut bent = false;
         if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
-            let t = texture_corners(mesh.texcoords, triangle.vertices);
+            let t = texture_corners(texcoords, triangle.vertices);
             uv = w * t[0] + u * t[1] + v * t[2];
             if F::NORMAL_MAPS
                 && let Some(map) = material.normal_map
@@ -78,7 +89,7 @@ impl<'a> SurfacePoint<'a> {
         let geometric_normal = side * normal;
         shading *= side;
         // An interpolated normal that faces away from the viewer is turned just far enough to face it.
-        if bent || !mesh.normals.is_empty() {
+        if bent || !normals.is_empty() {
             let cos = shading.dot(to_viewer);
             let lowest = MIN_VIEW_COSINE.min(geometric_normal.dot(to_viewer));
             if cos < lowest {

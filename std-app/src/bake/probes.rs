@@ -9,7 +9,6 @@ use crate::memory::{Budget, Shortage};
 use crate::render::Baked;
 use core::f32::consts::PI;
 use glam::Vec3;
-use halflight_core::geometry::Bounds;
 use halflight_core::{IrradiancePoint, PointIrradiance, Rgb};
 
 /// Fraction of back faces from which a probe is inside a body: half below a ground without a bottom.
@@ -157,6 +156,6 @@ fn mean<'a>(probes: impl ExactSizeIterator<Item = &'a Probe>) -> Probe {
 
 /// Lowest and highest corner of a scene in the coordinates of its files.
 fn scene_bounds(loaded: &LoadedScene) -> [[f64; 3]; 2] {
-    let bounds = Bounds::around(loaded.positions.iter().map(|&position| position.into()));
+    let bounds = loaded.mesh().bounds();
     [bounds.min, bounds.max].map(|corner| loaded.transform.to_user(corner))
 }

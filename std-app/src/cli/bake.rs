@@ -132,7 +132,7 @@ impl Bake {
         let mut budget = Budget::new(self.memory);
         let given = self.points.as_deref().map(|file| read_sensors(file, budget.left())).transpose()?;
         budget.take(given.as_ref().map_or(0, |sensors| size_of_val(&sensors[..])))?;
-        let options = LoadOptions { memory: Some(budget.left()), ..LoadOptions::default() };
+        let options = LoadOptions { memory: Some(budget.left()), copies: true, ..LoadOptions::default() };
         let loaded = self.load(&outputs, &options)?;
         let (points, sensors) = match given {
             Some(sensors) => (sensors.iter().map(|sensor| sensor.point(&loaded)).collect(), sensors),

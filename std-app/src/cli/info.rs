@@ -44,8 +44,8 @@ impl Info {
         let [kept, search] = FilmReconstruction::footprints_of_view::<All>(&scene.mesh, [width, height]);
         let facts = Facts {
             footprints: [
-                ("bvh", Bvh::kept_footprint(scene.mesh.triangles.len()).bytes()),
-                ("bvh_build", Bvh::footprint(scene.mesh.triangles.len()).bytes()),
+                ("bvh", Bvh::kept_footprint_of(&scene.mesh).bytes()),
+                ("bvh_build", Bvh::footprint_of(&scene.mesh).bytes()),
                 ("lights", LightSampler::footprint(&scene).bytes()),
                 ("film", Film::footprint(width, height).bytes()),
                 ("reconstruction", kept.or(search).bytes()),

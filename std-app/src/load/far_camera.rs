@@ -3,6 +3,7 @@
 
 use core::f64::consts::FRAC_PI_4;
 use glam::{DVec3, Vec3};
+use halflight_core::geometry::Bounds;
 use halflight_core::scene::{Camera, Mesh, StartPlane};
 
 /// Tangent of half the field of view of a long lens, at most.
@@ -31,14 +32,20 @@ pub(super) fn start(mesh: &Mesh, camera: &Camera, eye: DVec3, along: DVec3) -> O
         let (sin, cos) = (i as f64 * FRAC_PI_4).sin_cos();
         cos * right + sin * up - slope * along
     });
-    let depth = |index: u32| {
-        let corners = mesh.corners(index).map(|corner| corner.as_dvec3() - eye);
-        let is_outside = |side: &DVec3| corners.iter().all(|corner| corner.dot(*side) > lens);
-        let depths = corners.map(|corner| corner.dot(along));
-        let is_visible = depths.iter().any(|depth| *depth > 0.0) && !sides.iter().any(is_outside);
-        is_visible.then(|| depths.into_iter().fold(f64::INFINITY, f64::min))
+    let depth = |corners: &[Vec3]| {
+        let from_eye = |corner: &Vec3| corner.as_dvec3() - eye;
+        let is_outside = |side: &DVec3| corners.iter().all(|corner| from_eye(corner).dot(*side) > lens);
+        let depths = corners.iter().map(|corner| from_eye(corner).dot(along));
+        let is_visible = depths.clone().any(|depth| depth > 0.0) && !sides.iter().any(is_outside);
+        is_visible.then(|| depths.fold(f64::INFINITY, f64::min))
     };
-    let first = (0..mesh.triangles.len() as u32).filter_map(depth).fold(focus, f64::min);
+    let triangles = (0..mesh.triangles.len() as u32).filter_map(|index| depth(&mesh.corners(index)));
+    let of_box = |Bounds { min, max }: Bounds| {
+        depth(&[0, 1, 2, 3, 4, 5, 6, 7].map(|i| Vec3::from([0, 1, 2].map(|k| [min, max][i >> k & 1][k]))))
+    };
+    let instances = &mesh.instances;
+    let boxes = instances.placed.iter().filter_map(|instance| of_box(instances.bounds(instance)));
+    let first = triangles.chain(boxes).fold(focus, f64::min);
     let depth = first - MARGIN * first - 1.0;
     let anchor = eye + depth * along;
     let is_useful = depth > 0.0 && depth < f64::INFINITY && NEARER * anchor.length() < eye.length();

@@ -5,6 +5,7 @@
 //! [`LoadError`] with file, line and help. `docs/loading.md` has the table of both. The parsers take
 //! arbitrary bytes: [`obj::parse`], [`mtl::parse`], [`gltf::parse`], [`scene_file::parse`].
 
+mod assembly;
 mod buffers;
 mod bytes;
 mod coplanar;
@@ -16,6 +17,7 @@ mod fit;
 mod geometry;
 pub mod gltf;
 mod illum;
+mod instances;
 mod library;
 mod map;
 mod memory_estimate;
@@ -42,6 +44,7 @@ mod touching_glass;
 mod transform;
 
 pub use error::LoadError;
+pub use instances::LoadedInstances;
 pub use map::{Channel, Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
@@ -51,21 +54,19 @@ pub use texture_set::TextureSet;
 pub use transform::{SceneTransform, direction};
 
 use crate::memory::{self, Budget, Shortage};
-use core::ops::Range;
 use files::Lookup;
-use halflight_core::scene::{Environment, Material};
+use halflight_core::scene::Material;
 use library::{Library, Sources};
 use models::ReadModel;
 use mtl::MtlMaterial;
 use name::readings;
-use placed::{Placed, PlacedMesh, Placement};
+use placed::{PlacedMesh, Placement};
 use placed_light::PlacedLight;
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use texcoords::Texcoords;
 use texture_set::Embedded;
 
 /// Options of a load.
@@ -78,11 +79,14 @@ pub struct LoadOptions {
     /// True if the texture coordinates of the scene are to be those of the files, as charts of a lightmap.
     /// Otherwise a transform that all maps of a material share is applied to them.
     pub keeps_texcoords: bool,
+    /// True if each placement of a mesh is to have triangles of its own, as charts and vertices have that are
+    /// baked. Otherwise large meshes that are placed several times share their memory.
+    pub copies: bool,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { textures: true, memory: None, keeps_texcoords: false }
+        Self { textures: true, memory: None, keeps_texcoords: false, copies: false }
     }
 }
 
@@ -93,7 +97,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError
         Some("toml") => scene_file::load(path, options),
         Some("obj" | "glb" | "gltf") => {
             let mut builder = SceneBuilder::new(options);
-            builder.add_file(path, Placement::IDENTITY, None)?;
+            builder.add_file(path, Placement::IDENTITY, None, None)?;
             builder.build(path, options, None)
         }
         _ => Err(LoadError::of_file(
@@ -180,6 +184,7 @@ impl SceneBuilder {
         path: &Path,
         placement: Placement,
         material: Option<&str>,
+        share: Option<bool>,
     ) -> Result<(), LoadError> {
         let number = match self.obj_numbers.get(path) {
             Some(&number) => number,
@@ -201,7 +206,7 @@ impl SceneBuilder {
             None => self.own_materials(number, path),
         };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        self.meshes.push(PlacedMesh { name, obj: number, placement, materials });
+        self.meshes.push(PlacedMesh { name, obj: number, placement, materials, share });
         Ok(())
     }
 
@@ -290,99 +295,6 @@ impl SceneBuilder {
         self.embedded.clear();
         self.budget.give_back(core::mem::take(&mut self.held));
         Ok(set)
-    }
-
-    /// Names and vertices of the meshes, whose parts have these ends.
-    fn meshes(&self, ends: &[u32]) -> Vec<(String, Range<u32>)> {
-        let (mut parts, mut first) = (0, 0);
-        let range = |mesh: &PlacedMesh| {
-            parts += self.objs[mesh.obj].groups.len();
-            let end = ends[..parts].last().copied().unwrap_or_default();
-            (mesh.name.clone(), core::mem::replace(&mut first, end)..end)
-        };
-        self.meshes.iter().map(range).collect()
-    }
-
-    /// The scene with the buffers of the core.
-    fn build(
-        mut self,
-        path: &Path,
-        options: &LoadOptions,
-        environment: Option<EnvironmentChange>,
-    ) -> Result<LoadedScene, LoadError> {
-        for name in self.overrides.keys().filter(|name| !self.used_overrides.contains(*name)) {
-            self.notes
-                .add(1, format!("no mesh has a material `{name}`: its entry in the scene file is not used"));
-        }
-        let mut textures = self.textures(options, environment.as_ref())?;
-        let notes = &mut self.notes;
-        let of_maps = |mtl: &mut MtlMaterial| {
-            let maps = mtl.maps.values_mut().filter(|map| map.found.is_some() && !options.keeps_texcoords);
-            Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
-        };
-        let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
-        let given = &self.given;
-        let resolved = |(number, mtl): (u32, &MtlMaterial)| match given.get(&number) {
-            Some(material) => *material,
-            None => surface::resolve(mtl, &mut textures, notes),
-        };
-        let mut materials: Vec<Material> = (0..).zip(&self.materials).map(resolved).collect();
-        notes.merge(core::mem::take(&mut textures.notes));
-        let environment = environment.map(|entry| Environment {
-            radiance: entry.radiance,
-            map: textures.colour(entry.map.as_ref()),
-            to_map: entry.to_map,
-        });
-
-        let derived = textures.derived_bytes();
-        self.budget.take(derived).map_err(|why| too_large(path, &why))?;
-
-        let mut parts = Vec::new();
-        for mesh in &self.meshes {
-            for group in &self.objs[mesh.obj].groups {
-                let material = mesh.materials[group.material.unwrap_or(mesh.materials.len() - 1)];
-                let texcoords = texcoords[material as usize];
-                parts.push(Placed { group, placement: mesh.placement, material, texcoords });
-            }
-        }
-        count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
-        let fit = fit::Fit::of(&parts);
-        let pieces = geometry::pieces(&parts, &fit);
-        let bytes =
-            memory_estimate::of_scene(&parts, &materials).saturating_add(memory_estimate::of_pieces(pieces));
-        self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
-        let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
-        count_vertices(path, geometry.positions.len())?;
-        let mut names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
-        let mut overlaps = overlaps::locate(&geometry, &materials);
-        if duplicate_emitters::remove(&mut geometry, &overlaps, &materials, &names, notes) {
-            overlaps = overlaps::locate(&geometry, &materials);
-        }
-        overlaps::note(&overlaps, &geometry.triangles, &materials, &names, notes);
-        touching_glass::relate(&mut geometry, &overlaps, &mut materials, &mut names, notes);
-        open_glass::note(&geometry, &materials, &names, notes);
-        let lights = self.lights.iter().filter_map(|light| light.in_core(&fit.transform, notes)).collect();
-        let loaded = LoadedScene {
-            positions: geometry.positions,
-            normals: geometry.normals,
-            texcoords: geometry.texcoords,
-            triangles: geometry.triangles,
-            overlaps: overlaps::both_orders(&overlaps),
-            materials,
-            material_names: names,
-            meshes: self.meshes(&geometry.ends),
-            textures,
-            lights,
-            environment,
-            camera: None,
-            view: None,
-            cameras: self.cameras,
-            settings: RenderSettings::default(),
-            transform: fit.transform,
-            files: self.lookup.into_files().into_iter().chain([path.into()]).collect(),
-            repairs: self.notes.sentences(),
-        };
-        Ok(loaded.with_first_camera())
     }
 }
 

@@ -20,16 +20,18 @@ pub(super) struct ReadModel {
 }
 
 impl SceneBuilder {
-    /// Places a file by its extension; `material` replaces all of its materials.
+    /// Places a file by its extension; `material` replaces all of its materials, and `share` decides whether
+    /// its placements share memory.
     pub(super) fn add_file(
         &mut self,
         path: &Path,
         placement: Placement,
         material: Option<&str>,
+        share: Option<bool>,
     ) -> Result<(), LoadError> {
         let extension = path.extension().unwrap_or_default();
         if !["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {
-            return self.add_mesh(path, placement, material);
+            return self.add_mesh(path, placement, material, share);
         }
         let model = match self.models.get(path) {
             Some(model) => model.clone(),
@@ -48,7 +50,7 @@ impl SceneBuilder {
         };
         for (name, obj, own) in &model.instances {
             let (name, placement) = (name.clone(), placement.of(own));
-            self.meshes.push(PlacedMesh { name, obj: *obj, placement, materials: materials.clone() });
+            self.meshes.push(PlacedMesh { name, obj: *obj, placement, materials: materials.clone(), share });
         }
         self.lights.extend(model.lights.iter().map(|light| light.placed(&placement)));
         self.cameras.extend(model.cameras.iter().map(|camera| placed(camera, &placement)));

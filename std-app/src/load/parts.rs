@@ -114,6 +114,7 @@ impl SceneParts {
             obj: builder.objs.len() - 1,
             placement: Placement::IDENTITY,
             materials,
+            share: None,
         });
         Ok(())
     }

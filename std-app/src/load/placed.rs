@@ -19,6 +19,15 @@ pub(super) struct PlacedMesh {
     /// Index into the materials of the scene for each material of the OBJ, and last for faces without
     /// material.
     pub(super) materials: Rc<[u32]>,
+    /// Whether it shares the memory of its OBJ with other meshes; `None`: if that saves memory.
+    pub(super) share: Option<bool>,
+}
+
+impl PlacedMesh {
+    /// Material of the scene of a group of its OBJ.
+    pub(super) fn material_of(&self, group: &Group) -> u32 {
+        self.materials[group.material.unwrap_or(self.materials.len() - 1)]
+    }
 }
 
 /// Position and orientation of a mesh: `linear * p + offset`.

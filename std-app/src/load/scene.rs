@@ -1,12 +1,12 @@
 //! A loaded scene: the buffers that the core borrows, their files and repairs.
 
 use super::far_camera::start;
+use super::instances::LoadedInstances;
 use super::texture_set::TextureSet;
 use super::transform::{SceneTransform, direction};
 use crate::values::{Depth, MethodName, Samples, Seconds, Size, TargetError};
 use core::ops::Range;
 use glam::{DVec3, Vec3};
-use halflight_core::geometry::Bounds;
 use halflight_core::scene::{
     Camera, Environment, Material, Mesh, Overlap, PointLight, Scene, Texture, Triangle,
 };
@@ -26,11 +26,13 @@ pub struct LoadedScene {
     pub triangles: Vec<Triangle>,
     /// Pairs of triangles that overlap in one plane, in both orders, ascending.
     pub overlaps: Vec<Overlap>,
+    /// Meshes that are placed several times, in the memory of one.
+    pub instances: LoadedInstances,
     /// Materials of the triangles.
     pub materials: Vec<Material>,
     /// Names of the materials.
     pub material_names: Vec<String>,
-    /// Names of the meshes, files without their extensions, and their vertices.
+    /// Names of the meshes that are no instances, files without their extensions, and their vertices.
     pub meshes: Vec<(String, Range<u32>)>,
     /// Textures of the materials and the environment.
     pub textures: TextureSet,
@@ -130,6 +132,7 @@ impl LoadedScene {
             texcoords: &self.texcoords,
             triangles: &self.triangles,
             overlaps: &self.overlaps,
+            instances: self.instances.of_core(),
         }
     }
 
@@ -142,7 +145,7 @@ impl LoadedScene {
 
     /// The centre of the scene in the coordinates of the core: of its bounding box or its detail.
     pub fn middle(&self) -> Vec3 {
-        let bounds = Bounds::around(self.positions.iter().map(|&p| p.into()));
+        let bounds = self.mesh().bounds();
         if bounds.extent().max_element() > CENTRED { Vec3::ZERO } else { bounds.center() }
     }
 

@@ -51,7 +51,7 @@ impl<'a> Built<'a> {
         let bank = super::memory::Bank::new();
         let mut memory = Memory::of_scene(scene, limit, &bank);
         // The BVH comes first: its build needs working memory that later structures reuse.
-        let mut working = memory.take_pages("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
+        let mut working = memory.take_pages("bvh build", Bvh::footprint_of(&scene.mesh))?;
         let built = pool.build_bvh(&scene.mesh, level, &mut Arena::over(&mut working))?;
         let pages = owner.bvh.borrow_mut();
         *pages = memory.take_pages("bvh", built.used())?;

@@ -208,7 +208,7 @@ impl<'m> MemorySource<'m> for Memory<'m> {
 
 /// Bytes of the buffers of a scene.
 pub(crate) fn scene_bytes(scene: &Scene) -> usize {
-    let mesh = &scene.mesh;
+    let (mesh, instances) = (&scene.mesh, &scene.mesh.instances);
     let textures = scene.textures.iter().map(|texture| match texture.texels {
         Texels::Srgb8(texels) | Texels::Linear8(texels) => size_of_val(texels),
         Texels::Float(texels) => size_of_val(texels),
@@ -218,6 +218,13 @@ pub(crate) fn scene_bytes(scene: &Scene) -> usize {
         + size_of_val(mesh.normals)
         + size_of_val(mesh.texcoords)
         + size_of_val(mesh.triangles)
+        + size_of_val(instances.positions)
+        + size_of_val(instances.normals)
+        + size_of_val(instances.texcoords)
+        + size_of_val(instances.triangles)
+        + size_of_val(instances.overlaps)
+        + size_of_val(instances.prototypes)
+        + size_of_val(instances.placed)
         + size_of_val(scene.materials)
         + size_of_val(scene.lights)
         + textures.sum::<usize>()

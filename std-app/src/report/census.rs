@@ -7,8 +7,10 @@ use halflight_core::scene::Scene;
 pub fn counts(census: &Census, scene: &Scene) -> Vec<(&'static str, u64)> {
     let kinds = &census.surfaces;
     vec![
-        ("vertices", scene.mesh.positions.len() as u64),
+        ("vertices", (scene.mesh.positions.len() + scene.mesh.instances.positions.len()) as u64),
         ("triangles", census.triangles),
+        ("unique_triangles", if census.instances > 0 { census.unique_triangles } else { 0 }),
+        ("instances", census.instances),
         ("degenerate", census.degenerate),
         ("materials", census.materials),
         ("textures", census.textures),

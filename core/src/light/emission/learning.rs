@@ -238,12 +238,13 @@ fn for_each_caster_point(scene: &Scene, count: usize, mut visit: impl FnMut(u32,
         if area.is_finite() { area } else { 0.0 }
     };
     let is_caster = |index: &u32| {
-        let triangle = scene.mesh.triangles.get(*index as usize);
-        triangle
-            .and_then(|t| scene.materials.get(t.material as usize))
-            .is_some_and(Material::may_pass_caustics)
+        let material = scene.mesh.material(*index);
+        material.and_then(|m| scene.materials.get(m as usize)).is_some_and(Material::may_pass_caustics)
     };
-    let triangles = || (0..scene.mesh.triangles.len() as u32).filter(is_caster);
+    // Instances have more triangles than points are needed.
+    let (in_world, all) = (scene.mesh.triangles.len() as u32, scene.mesh.triangle_count() as u32);
+    let of_instances = (in_world..all).step_by(((all - in_world) >> 20) as usize + 1);
+    let triangles = || (0..in_world).chain(of_instances.clone()).filter(is_caster);
     let step = triangles().map(area).sum::<f64>() / count as f64;
     if step <= 0.0 || step.is_nan() {
         return;

@@ -242,10 +242,8 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         if let Some(slot) = strata.inverse_distance.get_mut(stratum) {
             *slot = 1.0 / hit.t;
         }
-        let triangle = self.context.scene.mesh.triangles.get(hit.triangle as usize);
-        let shines = match triangle
-            .and_then(|triangle| self.context.scene.materials.get(triangle.material as usize))
-        {
+        let material = self.context.scene.mesh.material(hit.triangle);
+        let shines = match material.and_then(|material| self.context.scene.materials.get(material as usize)) {
             Some(material) => material.emits(),
             None => self.context.scene.environment.is_some(),
         };

@@ -92,10 +92,10 @@ fn overhang_distance<F: Features>(context: &SceneContext<F>, probe: &Probe) -> f
 /// not.
 fn is_overhang<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
     let mesh = &context.scene.mesh;
-    let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
+    let Some(material) = mesh.material(hit.triangle) else { return false };
     let [a, b, c] = mesh.corners(hit.triangle);
     let cos = (b - a).cross(c - a).normalize_or_zero().dot(normal);
-    let material = context.scene.materials.get(triangle.material as usize);
+    let material = context.scene.materials.get(material as usize);
     cos.abs() > MIN_OVERHANG_COSINE
         && material.is_some_and(|material| {
             !matches!(material.surface, Surface::Dielectric { .. }) && !material.has_cutout()

@@ -84,7 +84,7 @@ fn viewed_lobe<F: Features>(
     let to_eye = context.scene.camera.eye - point.position;
     let bsdf = context.bsdf_at(point);
     let lobe = ViewedLobe::new(&bsdf, point.frame.to_local(to_eye.normalize()), to_eye.length())?;
-    let material = context.scene.mesh.triangles.get(point.triangle as usize)?.material;
+    let material = context.scene.mesh.material(point.triangle)?;
     let kind = LobeKind { material, alpha: lobe.alpha() };
     let is_served = ALPHAS.contains(&kind.alpha)
         && point.frame.normal.distance_squared(point.geometric_normal) <= FLAT

@@ -83,9 +83,8 @@ impl IrradiancePoint {
     /// The point of a triangle at the weights `u` and `v` of its second and third corner, on its front, where
     /// the corners go counter-clockwise, or on its back. `None` without such a triangle or its area.
     pub fn on_triangle(scene: &Scene, triangle: u32, [u, v]: [f32; 2], front: bool) -> Option<Self> {
-        let corners = scene.mesh.triangles.get(triangle as usize)?.vertices;
-        let corner = |i: usize| Some(Vec3::from(*scene.mesh.positions.get(corners[i] as usize)?));
-        let normal = (corner(1)? - corner(0)?).cross(corner(2)? - corner(0)?).try_normalize()?;
+        let [a, b, c] = scene.mesh.corners(triangle);
+        let normal = (b - a).cross(c - a).try_normalize()?;
         let direction = if front { -normal } else { normal };
         let hit = Hit { triangle, u, v, t: 0.0 };
         let point = SurfacePoint::at::<All>(scene, &Ray::new(Vec3::ZERO, direction), &hit)?;

@@ -92,14 +92,14 @@ impl<'a, F: Features> SceneContext<'a, F> {
     #[inline]
     pub(crate) fn nearest(&self, ray: &Ray) -> Hit {
         let hit = self.bvh.nearest(self.level, ray);
-        if self.scene.mesh.overlaps.is_empty() { hit } else { self.scene.visible_hit(ray, hit) }
+        if self.scene.mesh.has_overlaps() { self.scene.visible_hit(ray, hit) } else { hit }
     }
 
     /// Nearest hits of `rays`.
     #[inline]
     pub(crate) fn nearest_batch(&self, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         self.bvh.nearest_batch(self.level, rays, coherence, hits);
-        if !self.scene.mesh.overlaps.is_empty() {
+        if self.scene.mesh.has_overlaps() {
             rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.scene.visible_hit(ray, *hit));
         }
     }

@@ -26,6 +26,10 @@ pub(crate) struct PointBlock<'a> {
     /// Set of hits whose colours were looked up in lanes, and their texels.
     textured: u32,
     texel: Row3,
+    /// Set of hits of instances, with texture coordinates and the error that the transform adds.
+    placed: u32,
+    texcoords: [[Vec2; 3]; BLOCK],
+    more_error: Row,
     /// Set of hits with a point, by [`PointBlock::meet`].
     pub(crate) met: u32,
 }
@@ -46,6 +50,9 @@ impl<'a> PointBlock<'a> {
             textures: TextureBlock::EMPTY,
             textured: 0,
             texel: [[0.0; BLOCK]; 3],
+            placed: 0,
+            texcoords: [[Vec2::ZERO; 3]; BLOCK],
+            more_error: [0.0; BLOCK],
             met: 0,
         }
     }
@@ -54,7 +61,9 @@ impl<'a> PointBlock<'a> {
     #[inline]
     pub(crate) fn gather(&mut self, scene: &Scene<'a>, i: usize, hit: &Hit) -> bool {
         let (mesh, i) = (&scene.mesh, i & 15);
-        let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
+        let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else {
+            return self.gather_of_instance(scene, i, hit);
+        };
         let Some(material) = scene.materials.get(triangle.material as usize) else { return false };
         let [a, b, c] = triangle.vertices;
         let corner = |vertex: u32| mesh.positions.get(vertex as usize);
@@ -62,7 +71,7 @@ impl<'a> PointBlock<'a> {
         put(&mut self.corners[0], i, p0);
         put(&mut self.corners[1], i, p1);
         put(&mut self.corners[2], i, p2);
-        if !mesh.normals.is_empty() {
+        if mesh.has_normals() {
             let normal = |vertex: u32| mesh.normals.get(vertex as usize).copied().unwrap_or_default();
             put(&mut self.normals[0], i, normal(a));
             put(&mut self.normals[1], i, normal(b));
@@ -70,6 +79,24 @@ impl<'a> PointBlock<'a> {
         }
         (self.weights[0][i], self.weights[1][i]) = (hit.u, hit.v);
         (self.triangle[i], self.material[i]) = (hit.triangle, material);
+        self.placed &= !(1 << i);
+        true
+    }
+
+    /// [`PointBlock::gather`] of a triangle that is not in world space.
+    #[inline(never)]
+    fn gather_of_instance(&mut self, scene: &Scene<'a>, i: usize, hit: &Hit) -> bool {
+        let Some(triangle) = scene.mesh.placed_triangle(hit.triangle) else { return false };
+        let Some(material) = scene.materials.get(triangle.material as usize) else { return false };
+        for k in 0..3 {
+            put(&mut self.corners[k], i, triangle.positions[k]);
+            put(&mut self.normals[k], i, triangle.normals[k]);
+        }
+        (self.weights[0][i], self.weights[1][i]) = (hit.u, hit.v);
+        (self.triangle[i], self.material[i]) = (hit.triangle, material);
+        self.texcoords[i] = triangle.texcoords.map(Vec2::from);
+        self.more_error[i] = triangle.error;
+        self.placed |= 1 << i;
         true
     }
 
@@ -128,14 +155,18 @@ impl<'a> PointBlock<'a> {
         let Some(records) = records.first_chunk() else { return met };
         let surfaces = Surfaces {
             corners: &self.corners,
-            normals: (!scene.mesh.normals.is_empty()).then_some(&self.normals),
+            normals: scene.mesh.has_normals().then_some(&self.normals),
             weights: &self.weights,
             rays: records,
         };
         surfaces.compute(context.level, &mut self.surface);
+        Set(met & self.placed).for_each(|i| self.surface.error[i] += self.more_error[i]);
         if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
             for i in Set(met) {
-                let t = scene.mesh.corner_texcoords(self.triangle[i]);
+                let t = match self.placed >> i & 1 {
+                    0 => scene.mesh.corner_texcoords(self.triangle[i]),
+                    _ => self.texcoords[i],
+                };
                 let (u, v) = (self.weights[0][i], self.weights[1][i]);
                 self.uv[i] = (1.0 - u - v) * t[0] + u * t[1] + v * t[2];
             }

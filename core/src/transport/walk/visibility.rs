@@ -178,8 +178,8 @@ impl<F: Features> SceneContext<'_, F> {
     /// Rest of a shadow ray behind `hit`, and the transmittance; `None` at an opaque surface.
     pub(crate) fn pass_cutout(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, Rgb)> {
         // Most surfaces are opaque: leave before the surface point is computed.
-        let triangle = self.scene.mesh.triangles.get(hit.triangle as usize)?;
-        if !self.scene.materials.get(triangle.material as usize)?.has_cutout() {
+        let material = self.scene.mesh.material(hit.triangle)?;
+        if !self.scene.materials.get(material as usize)?.has_cutout() {
             return None;
         }
         let point = self.surface_at(ray, hit)?;

@@ -4,12 +4,14 @@
 
 mod light;
 mod material;
+mod placement;
 mod values;
 
 pub(super) use light::EnvironmentChange;
 pub use light::{EnvironmentEntry, LightEntry, LightKind};
 pub(super) use material::MaterialChange;
 pub use material::{MaterialEntry, MaterialKind};
+pub use placement::InstanceEntry;
 pub(super) use values::BRIGHTEST;
 pub use values::{Colour, Factors, Matrix, Reflectance, Rotation};
 
@@ -17,13 +19,11 @@ use super::error::LoadError;
 use super::files::{Found, Lookup};
 use super::map::Map;
 use super::notes::Notes;
-use super::placed::Placement;
 use super::scene::{LoadedScene, RenderSettings, View};
 use super::{LoadOptions, SceneBuilder, memory_estimate, read, too_large};
 use crate::values::{FieldOfView, NotNegative, Number, Positive};
 use core::cell::RefCell;
 use core::ops::Range;
-use glam::{DMat3, DVec3};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -69,6 +69,11 @@ pub struct MeshEntry {
     pub matrix: Option<Matrix>,
     /// Name of the `[material.NAME]` that replaces all materials of the file.
     pub material: Option<Spanned<String>>,
+    /// Placements of the mesh, in addition to its own; one without them.
+    pub instances: Option<Vec<Spanned<InstanceEntry>>>,
+    /// True: all placements of the file share its memory. False: each has its own triangles. By default they
+    /// share what saves memory.
+    pub share: Option<bool>,
 }
 
 /// The camera.
@@ -190,7 +195,9 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     builder.lookup = source.lookup.take();
     for (mesh, file) in scene.mesh.iter().zip(mesh_files) {
         let material = mesh.material.as_ref().map(|name| name.get_ref().as_str());
-        builder.add_file(&file, mesh.placement(&source)?, material)?;
+        for placement in mesh.placements(&source)? {
+            builder.add_file(&file, placement, material, mesh.share)?;
+        }
     }
     let mut loaded = builder.build(path, options, environment)?;
     let transform = loaded.transform;
@@ -216,22 +223,6 @@ impl MeshEntry {
             }
             _ => Ok(file),
         }
-    }
-
-    fn placement(&self, source: &Source) -> Result<Placement, LoadError> {
-        let is_default = self.scale == Factors::default()
-            && self.rotate.is_none()
-            && self.translate == <[Number; 3]>::default();
-        if let Some(matrix) = &self.matrix {
-            if is_default {
-                return Ok(matrix.placement());
-            }
-            let help = "give either `matrix`, or `scale`, `rotate` and `translate`";
-            return Err(source.error(self.file.span(), "this mesh is placed in two ways", help));
-        }
-        let rotation = self.rotate.as_ref().map_or(DMat3::IDENTITY, Rotation::matrix);
-        let linear = rotation * DMat3::from_diagonal(self.scale.axes().into());
-        Ok(Placement { linear, offset: DVec3::from(self.translate.map(f64::from)) })
     }
 }
 

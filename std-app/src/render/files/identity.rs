@@ -106,6 +106,15 @@ fn geometry(scene: &Scene, hash: &mut Hash) {
     hash.section(bytemuck::cast_slice(mesh.normals));
     hash.section(bytemuck::cast_slice(mesh.texcoords));
     hash.section(bytemuck::cast_slice(mesh.triangles));
+    let instances = &mesh.instances;
+    if !instances.is_empty() {
+        hash.section(bytemuck::cast_slice(instances.positions));
+        hash.section(bytemuck::cast_slice(instances.normals));
+        hash.section(bytemuck::cast_slice(instances.texcoords));
+        hash.section(bytemuck::cast_slice(instances.triangles));
+        hash.section(bytemuck::cast_slice(instances.prototypes));
+        hash.section(bytemuck::cast_slice(instances.placed));
+    }
 }
 
 fn materials(scene: &Scene, hash: &mut Hash) {

@@ -264,10 +264,8 @@ impl Reference<'_> {
 
     /// Unit normal of a triangle.
     fn normal_of(&self, triangle: u32) -> Option<Vec3> {
-        let mesh = &self.context.scene.mesh;
-        let corners = mesh.triangles.get(triangle as usize)?.vertices;
-        let [a, b, c] = corners.map(|i| mesh.positions.get(i as usize).copied().map(Vec3::from));
-        (b? - a?).cross(c? - a?).try_normalize()
+        let [a, b, c] = self.context.scene.mesh.corners(triangle);
+        (b - a).cross(c - a).try_normalize()
     }
 
     /// Density of emission per étendue, that of a light sample, per area of the light where it has one, and

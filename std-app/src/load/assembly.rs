@@ -1,0 +1,133 @@
+//! A scene from its files: materials, one mesh in the coordinates of the core, and instances.
+
+use super::instances::{self, Shared};
+use super::mtl::MtlMaterial;
+use super::placed::{Placed, PlacedMesh};
+use super::scene::{LoadedScene, RenderSettings};
+use super::scene_file::EnvironmentChange;
+use super::texcoords::Texcoords;
+use super::{LoadError, LoadOptions, SceneBuilder, count_vertices, too_large};
+use super::{duplicate_emitters, fit, geometry, memory_estimate, open_glass, overlaps, surface, touching_glass};
+use core::ops::Range;
+use halflight_core::scene::{Environment, Material};
+use std::path::Path;
+
+impl SceneBuilder {
+    /// Names and vertices of the meshes that are no instances, whose parts have these ends.
+    fn meshes(&self, ends: &[u32], shared: &Shared) -> Vec<(String, Range<u32>)> {
+        let (mut parts, mut first) = (0, 0);
+        let range = |(_, mesh): (usize, &PlacedMesh)| {
+            parts += self.objs[mesh.obj].groups.len();
+            let end = ends[..parts].last().copied().unwrap_or_default();
+            (mesh.name.clone(), core::mem::replace(&mut first, end)..end)
+        };
+        self.meshes.iter().enumerate().filter(|(number, _)| !shared.has(*number)).map(range).collect()
+    }
+
+    /// The scene with the buffers of the core.
+    pub(super) fn build(
+        mut self,
+        path: &Path,
+        options: &LoadOptions,
+        environment: Option<EnvironmentChange>,
+    ) -> Result<LoadedScene, LoadError> {
+        for name in self.overrides.keys().filter(|name| !self.used_overrides.contains(*name)) {
+            self.notes
+                .add(1, format!("no mesh has a material `{name}`: its entry in the scene file is not used"));
+        }
+        let mut textures = self.textures(options, environment.as_ref())?;
+        let notes = &mut self.notes;
+        let of_maps = |mtl: &mut MtlMaterial| {
+            let maps = mtl.maps.values_mut().filter(|map| map.found.is_some() && !options.keeps_texcoords);
+            Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
+        };
+        let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
+        let given = &self.given;
+        let resolved = |(number, mtl): (u32, &MtlMaterial)| match given.get(&number) {
+            Some(material) => *material,
+            None => surface::resolve(mtl, &mut textures, notes),
+        };
+        let mut materials: Vec<Material> = (0..).zip(&self.materials).map(resolved).collect();
+        notes.merge(core::mem::take(&mut textures.notes));
+        let environment = environment.map(|entry| Environment {
+            radiance: entry.radiance,
+            map: textures.colour(entry.map.as_ref()),
+            to_map: entry.to_map,
+        });
+
+        let derived = textures.derived_bytes();
+        self.budget.take(derived).map_err(|why| too_large(path, &why))?;
+
+        let shared = match options.copies || options.keeps_texcoords {
+            true => Shared::none(&self.meshes),
+            false => Shared::of(&self.meshes, &self.objs, &materials, notes),
+        };
+        let (mut parts, mut placed) = (Vec::new(), Vec::new());
+        for (number, mesh) in self.meshes.iter().enumerate() {
+            for group in &self.objs[mesh.obj].groups {
+                let material = mesh.material_of(group);
+                let texcoords = texcoords[material as usize];
+                let part = Placed { group, placement: mesh.placement, material, texcoords };
+                if shared.has(number) { placed.push(part) } else { parts.push(part) }
+            }
+        }
+        // Instances extend the scene as copies do.
+        let in_world = parts.len();
+        parts.extend(placed);
+        let fit = fit::Fit::of(&parts);
+        parts.truncate(in_world);
+        count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
+        let prototypes = shared.parts(&self.meshes, &self.objs, &texcoords);
+        let bytes = prototypes.iter().map(|parts| memory_estimate::of_scene(parts, &materials)).sum();
+        self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
+        let pieces = geometry::pieces(&parts, &fit);
+        let bytes =
+            memory_estimate::of_scene(&parts, &materials).saturating_add(memory_estimate::of_pieces(pieces));
+        self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
+        let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
+        count_vertices(path, geometry.positions.len())?;
+        let mut names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
+        let mut overlaps = overlaps::locate(&geometry, &materials);
+        if duplicate_emitters::remove(&mut geometry, &overlaps, &materials, &names, notes) {
+            overlaps = overlaps::locate(&geometry, &materials);
+        }
+        overlaps::note(&overlaps, &geometry.triangles, &materials, &names, notes);
+        touching_glass::relate(&mut geometry, &overlaps, &mut materials, &mut names, notes);
+        open_glass::note(&geometry, &materials, &names, notes);
+        let mut instances = instances::Builder::default();
+        for parts in &prototypes {
+            instances.add(parts, (&mut materials, &mut names), notes);
+        }
+        let instances = instances
+            .place(&shared, &self.meshes, &fit.transform, geometry.triangles.len())
+            .map_err(|count| too_many_triangles(path, count))?;
+        let lights = self.lights.iter().filter_map(|light| light.in_core(&fit.transform, notes)).collect();
+        let loaded = LoadedScene {
+            positions: geometry.positions,
+            normals: geometry.normals,
+            texcoords: geometry.texcoords,
+            triangles: geometry.triangles,
+            overlaps: overlaps::both_orders(&overlaps),
+            materials,
+            material_names: names,
+            instances,
+            meshes: self.meshes(&geometry.ends, &shared),
+            textures,
+            lights,
+            environment,
+            camera: None,
+            view: None,
+            cameras: self.cameras,
+            settings: RenderSettings::default(),
+            transform: fit.transform,
+            files: self.lookup.into_files().into_iter().chain([path.into()]).collect(),
+            repairs: self.notes.sentences(),
+        };
+        Ok(loaded.with_first_camera())
+    }
+}
+
+fn too_many_triangles(path: &Path, count: u64) -> LoadError {
+    let problem = format!("the scene has {count} triangles with its instances, more than 32 bits can count");
+    LoadError::of_file(path, problem, "leave out some of its instances")
+}
