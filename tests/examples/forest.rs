@@ -1,7 +1,7 @@
 //! Forest for measurements of instances: trees of about 100,000 triangles that are placed many times.
 //!
-//! `cargo run --release -p halflight-tests --example forest -- FOLDER [TREES [TRIANGLES [KINDS]]]`, by default
-//! 1000 trees of 100,000 triangles and 4 kinds. Writes `forest.toml`, where the trees share their memory, and
+//! `cargo run --release -p halflight-tests --example forest -- FOLDER [TREES [TRIANGLES [KINDS]]]`, by
+//! default 1000 trees of 100,000 triangles and 4 kinds. Writes `forest.toml`, where the trees share their memory, and
 //! `copies.toml`, where they do not, with the meshes and materials. Then for example
 //! `halflight render FOLDER/forest.toml --spp 16 -o forest.exr --json`.
 
@@ -120,7 +120,12 @@ impl Tree {
         let normal = [r * angle.cos(), r * angle.sin(), z];
         let ([u, v], first) = (sides(normal), self.vertices.len());
         let size = self.random.between(0.03, 0.06);
-        let tips = [add(place, u, size), add(place, v, 0.5 * size), add(place, u, -size), add(place, v, -0.5 * size)];
+        let tips = [
+            add(place, u, size),
+            add(place, v, 0.5 * size),
+            add(place, u, -size),
+            add(place, v, -0.5 * size),
+        ];
         self.vertices.extend(tips);
         self.leaves.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
@@ -141,7 +146,8 @@ impl Tree {
     }
 }
 
-const MATERIALS: &str = "newmtl wood\nKd 0.25 0.17 0.1\nnewmtl leaf\nKd 0.12 0.3 0.06\nnewmtl soil\nKd 0.2 0.15 0.1\n";
+const MATERIALS: &str =
+    "newmtl wood\nKd 0.25 0.17 0.1\nnewmtl leaf\nKd 0.12 0.3 0.06\nnewmtl soil\nKd 0.2 0.15 0.1\n";
 
 /// The scene file of `trees` trees of `kinds` kinds.
 fn scene(trees: usize, kinds: usize, share: bool) -> String {
@@ -153,9 +159,8 @@ fn scene(trees: usize, kinds: usize, share: bool) -> String {
     for kind in 0..kinds {
         let _ = writeln!(text, "\n[[mesh]]\nfile = \"tree-{kind}.obj\"\nshare = {share}\ninstances = [");
         for i in (kind..trees).step_by(kinds) {
-            let [x, z] = [i % columns, i / columns].map(|cell| {
-                SPACING * (cell as f64 + random.between(0.1, 0.9)) - 0.5 * side
-            });
+            let [x, z] = [i % columns, i / columns]
+                .map(|cell| SPACING * (cell as f64 + random.between(0.1, 0.9)) - 0.5 * side);
             let (scale, degrees) = (random.between(0.7, 1.3), random.between(0.0, 360.0));
             let _ = writeln!(
                 text,

@@ -35,7 +35,7 @@ impl TestArena {
 /// # Panics
 /// If a footprint is smaller than a build needs.
 pub fn with_structures<T>(scene: &Scene, work: impl FnOnce(&Bvh, &LightSampler) -> T) -> T {
-    let mut bvh = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
+    let mut bvh = TestArena::new(Bvh::footprint_of(&scene.mesh));
     let bvh = Bvh::build(&scene.mesh, &mut bvh.arena()).expect("the footprint suffices");
     let mut lights = TestArena::new(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
     let lights = LightSampler::build(scene, &mut lights.arena()).expect("the footprint suffices");

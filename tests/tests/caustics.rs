@@ -48,7 +48,7 @@ type Shot = (usize, f32, bool);
 /// Sums of blocks of pictures of `scene` by 16 samples, merged with photons if `tasks` > 0.
 fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_depth: u32) -> Vec<Vec<f64>> {
     let level = Level::detect();
-    let mut bvh_memory = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
+    let mut bvh_memory = TestArena::new(Bvh::footprint_of(&scene.mesh));
     let bvh = Bvh::build(&scene.mesh, &mut bvh_memory.arena()).unwrap();
     let mut light_memory = TestArena::new(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
     let lights = LightSampler::build(scene, &mut light_memory.arena()).unwrap();
@@ -397,7 +397,7 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     let buffers = stadium(side);
     let scene = buffers.scene();
     let level = Level::detect();
-    let mut bvh_memory = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
+    let mut bvh_memory = TestArena::new(Bvh::footprint_of(&scene.mesh));
     let bvh = Bvh::build(&scene.mesh, &mut bvh_memory.arena()).unwrap();
     let mut light_memory = TestArena::new(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
     let lights = LightSampler::build(&scene, &mut light_memory.arena()).unwrap();

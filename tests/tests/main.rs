@@ -19,6 +19,7 @@ mod furnace;
 mod golden;
 mod hall;
 mod hidden_light;
+mod instances;
 mod irradiance_cache;
 mod irradiance_gaps;
 mod irradiance_rooms;

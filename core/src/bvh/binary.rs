@@ -91,8 +91,11 @@ impl<J: ForkJoin> Division<'_, J> {
         if n < 2 {
             return;
         }
-        let (mid, left, right) =
-            if depth < self.halving_depth { divide(self.level, references, extent) } else { halve(references) };
+        let (mid, left, right) = if depth < self.halving_depth {
+            divide(self.level, references, extent)
+        } else {
+            halve(references)
+        };
         let (left_references, right_references) = references.split_at_mut(mid);
         let (left_nodes, right_nodes) = below.split_at_mut(nodes_of(mid).min(below.len()));
         let mut on_the_left = || self.subtree(left_references, left_nodes, &left, depth + 1);

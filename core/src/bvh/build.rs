@@ -5,7 +5,7 @@ use super::binary::{self, BinaryNode, HALVING_DEPTH, nodes_of};
 use super::collapse::{Costs, Emitter, Output, evaluate};
 use super::fork_join::ForkJoin;
 use super::instances::Entry;
-use super::layout::{Child, LEAF_MAX, Node};
+use super::layout::{Child, LEAF_MAX, Node, SLACK, Tree};
 use super::references::{self, Reference, capacity};
 use super::top::{self, Top};
 use crate::Level;
@@ -18,10 +18,6 @@ use glam::Vec4Swizzles;
 const fn nodes_max(references: usize) -> usize {
     references / 7 + 1
 }
-
-/// Margin of the boxes in units of the largest coordinate: two units in its last place. A ray in the plane of
-/// a face is then inside the box, and a part of a triangle is inside its box despite rounding.
-pub(super) const SLACK: f32 = 2.0 * f32::EPSILON;
 
 /// Floats that may be read beyond the last run of coordinates.
 const PADDING: usize = LEAF_MAX;
@@ -106,13 +102,6 @@ fn of_output(out: Output) -> Bvh {
         triangles: &out.triangles[..triangles_used],
         ..EMPTY
     }
-}
-
-/// Tree of one mesh.
-pub(super) struct Tree {
-    pub root: Child,
-    pub bounds: Bounds,
-    slack: f32,
 }
 
 /// Builds the tree of `mesh` without its instances after the used part of `out`; `None` without triangles

@@ -34,7 +34,8 @@ impl Forest {
             .map(|i| {
                 let mut column = || (2.0 * random.point() - 1.0).to_array();
                 let (mut linear, at) = ([column(), column(), column()], column());
-                if (Vec3::from(linear[0]).cross(linear[1].into()).dot(linear[2].into()) < 0.0) != (i % 2 == 0) {
+                if (Vec3::from(linear[0]).cross(linear[1].into()).dot(linear[2].into()) < 0.0) != (i % 2 == 0)
+                {
                     linear.swap(0, 1);
                 }
                 Instance::new((i % parts.len()) as u32, linear, at.map(|x| spread * x)).expect("an inverse")
@@ -158,7 +159,8 @@ fn hits_of_instances_are_those_of_copies_within_rounding() {
             all += 1;
             same += u32::from(hit.triangle == copy.triangle);
             if hit.triangle == copy.triangle && hit.is_some() {
-                let size = Vec3::from(ray.origin).abs().max_element() + Vec3::from(ray.direction).length() * hit.t;
+                let size =
+                    Vec3::from(ray.origin).abs().max_element() + Vec3::from(ray.direction).length() * hit.t;
                 let difference = ray.at(hit.t).distance(ray.at(copy.t));
                 assert!(difference <= TOLERANCE * size, "{hit:?} {copy:?} {ray:?}");
                 // Barycentric weights belong to the corners in world space.
@@ -177,7 +179,10 @@ fn a_build_takes_its_footprint_and_a_copy_its_used_bytes() {
         let mesh = forest.mesh();
         let bytes = Bvh::footprint_of(&mesh).bytes();
         let mut memory = lines(bytes);
-        assert!(Bvh::build(&mesh, &mut Arena::new(&mut bytemuck::cast_slice_mut(&mut memory)[..bytes - 1])).is_err());
+        assert!(
+            Bvh::build(&mesh, &mut Arena::new(&mut bytemuck::cast_slice_mut(&mut memory)[..bytes - 1]))
+                .is_err()
+        );
         let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory)).expect("exact footprint");
         let mut kept = lines(bvh.used().bytes());
         let copy = bvh.copied(&mut Arena::over(&mut kept)).expect("exact footprint");

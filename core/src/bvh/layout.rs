@@ -1,6 +1,7 @@
 //! Memory layout of the BVH: nodes of eight boxes, and leaves of up to eight triangles. The coordinates of a
 //! leaf lie in runs, so that one load fills a register and no lane is padded.
 
+use crate::geometry::Bounds;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use halflight_simd::kernels::boxes::Boxes8;
@@ -17,6 +18,18 @@ pub(super) const DEPTH_MAX: usize = 96;
 pub(super) use halflight_simd::STACK;
 
 const _: () = assert!(STACK >= (WIDTH - 1) * DEPTH_MAX + 2 * WIDTH);
+
+/// Margin of the boxes in units of the largest coordinate: two units in its last place. A ray in the plane of
+/// a face is then inside the box, and a part of a triangle is inside its box despite rounding.
+pub(super) const SLACK: f32 = 2.0 * f32::EPSILON;
+
+/// Tree of one mesh.
+pub(super) struct Tree {
+    pub root: Child,
+    pub bounds: Bounds,
+    /// Margin of its boxes.
+    pub slack: f32,
+}
 
 /// Eight boxes (rows 0 … 5), the bits of their [`Child`]ren (row 6), and for each octant of directions their
 /// order from far to near (row 7, four bits each). Four cache lines.

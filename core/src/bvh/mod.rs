@@ -27,8 +27,8 @@ use crate::geometry::{Bounds, Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
 use batch::{Stream, Tiles};
-use instances::Entry;
 use halflight_simd::{Kernel, Simd};
+use instances::Entry;
 use layout::{Child, Node};
 use query::{Nearest, Occluded};
 
@@ -173,6 +173,6 @@ impl<const ANY: bool> Kernel for Single<'_, '_, ANY> {
 }
 
 #[cfg(test)]
-mod tests;
-#[cfg(test)]
 mod instance_tests;
+#[cfg(test)]
+mod tests;

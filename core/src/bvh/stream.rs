@@ -13,7 +13,7 @@
 
 use super::Bvh;
 use super::instances::Outside;
-use super::layout::Child;
+use super::layout::{Child, Node};
 use super::leaf::{meets_on_edge, take};
 use super::query::Sink;
 use super::traversal_ray::{TraversalRay, traceable};
@@ -40,6 +40,13 @@ struct Slot {
 }
 
 impl Slot {
+    /// Takes the ray into an instance, or back out of it: see [`Bvh::cross`].
+    fn cross(&mut self, bvh: &Bvh, rays: &[Ray], child: Child, stack: &mut Stack) {
+        if let Some(world) = rays.get(self.ray.index as usize) {
+            bvh.cross(child, world, (&mut self.ray, &mut self.hit), &mut self.outside, stack);
+        }
+    }
+
     const EMPTY: Slot = Slot { ray: TraversalRay::NONE, hit: Hit::NONE, outside: Outside::WORLD };
 }
 
@@ -131,18 +138,10 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
         }
 
         while let Some(i) = pop(&mut nodes) {
-            let (Slot { ray, hit, outside }, stack) = (&mut slots[i], &mut stacks[i]);
-            let Some(node) = bvh.nodes.get(next[i] as usize) else {
-                let Some(world) = queue.rays.get(ray.index as usize) else { return };
-                bvh.cross(Child(next[i]), world, (ray, hit), outside, stack);
-                next[i] = take_next::<S, ANY>(simd, bvh, stack);
-                continue;
-            };
-            let (entry, exit) = ray.slab8(simd).interval(simd, &node.rows, ray.t_max);
-            if ANY {
-                simd.push8_unordered(entry, exit, &node.rows[6], stack);
-            } else {
-                simd.push8(node.order_of(ray.octant()), entry, exit, &node.rows[6], stack);
+            let (slot, stack) = (&mut slots[i], &mut stacks[i]);
+            match bvh.nodes.get(next[i] as usize) {
+                Some(node) => visit::<S, ANY>(simd, node, &slot.ray, stack),
+                None => slot.cross(bvh, rays, Child(next[i]), stack),
             }
             next[i] = take_next::<S, ANY>(simd, bvh, stack);
         }
@@ -184,6 +183,17 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
         while let Some(i) = pop(&mut leaves) {
             next[i] = take_next::<S, ANY>(simd, bvh, &mut stacks[i]);
         }
+    }
+}
+
+/// Pushes the children of `node` that the ray meets.
+#[inline(always)]
+fn visit<S: Simd, const ANY: bool>(simd: S, node: &Node, ray: &TraversalRay, stack: &mut Stack) {
+    let (entry, exit) = ray.slab8(simd).interval(simd, &node.rows, ray.t_max);
+    if ANY {
+        simd.push8_unordered(entry, exit, &node.rows[6], stack);
+    } else {
+        simd.push8(node.order_of(ray.octant()), entry, exit, &node.rows[6], stack);
     }
 }
 

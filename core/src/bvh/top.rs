@@ -1,15 +1,12 @@
-//! Upper level of the hierarchy: boxes around instances, and around the mesh in world space.
-//!
-//! Instances that overlap are opened: the children of a prototype's root become entries of their own, with
-//! tighter boxes (Benthin, Woop, Wald, Áfra 2017, "Improved Two-Level BVHs using Partial Re-Braiding").
+//! Upper level of the hierarchy: a tree over the boxes of instances and of the mesh in world space, each of
+//! which is a leaf (Wald, Benthin, Slusallek 2003, "Distributed Interactive Ray Tracing of Dynamic Scenes").
 
 use super::Bvh;
 use super::binary::{self, BinaryNode, left_child, nodes_of, right_child};
-use super::build::{SLACK, Tree};
 use super::collapse::Output;
 use super::fork_join::ForkJoin;
 use super::instances::{ENTRIES_MAX, Entry, entry};
-use super::layout::{Child, Node, WIDTH};
+use super::layout::{Child, Node, SLACK, Tree, WIDTH};
 use super::references::Reference;
 use crate::Level;
 use crate::geometry::Bounds;
@@ -21,15 +18,12 @@ use halflight_simd::kernels::shade::surface::ERROR_UNITS;
 /// Ranges are halved from this depth on.
 const HALVING_DEPTH: usize = 8;
 
-/// Entries of an instance.
-const OPENED: usize = 1;
-
 /// Levels of a prototype's tree whose boxes bound an instance.
 const LEVELS: usize = 2;
 
 /// Numbers of nodes and entries that suffice; `None` if there are too many instances.
 pub(super) fn room(mesh: &Mesh) -> Option<(usize, usize)> {
-    let entries = mesh.instances.placed.len().checked_mul(OPENED)?;
+    let entries = mesh.instances.placed.len();
     (entries < ENTRIES_MAX).then_some((entries + 1, entries))
 }
 

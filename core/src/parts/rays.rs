@@ -18,4 +18,4 @@
 
 pub use crate::bvh::{Bvh, Coherence, ForkJoin, Serial};
 pub use crate::geometry::{Bounds, Hit, MISS, Ray};
-pub use crate::scene::{Mesh, SurfacePoint, Triangle};
+pub use crate::scene::{Instance, Instances, Mesh, Prototype, SurfacePoint, Triangle};

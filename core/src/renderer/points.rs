@@ -92,8 +92,7 @@ impl<'a> IrradianceRenderer<'a> {
     /// Memory for so many points in `scene`, before anything is built.
     pub fn required_memory(scene: &Scene, points: usize) -> RequiredMemory {
         let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
-        let structures =
-            Bvh::footprint_of(&scene.mesh).and(lights).and(Self::footprint(scene, points));
+        let structures = Bvh::footprint_of(&scene.mesh).and(lights).and(Self::footprint(scene, points));
         RequiredMemory { structures: structures.bytes(), scratch: Self::scratch().bytes() }
     }
 

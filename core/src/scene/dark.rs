@@ -55,8 +55,8 @@ fn is_bright(light: Rgb) -> bool {
 mod tests {
     use super::*;
     use crate::scene::{
-        Camera, ColorInput, Environment, Instances, Material, Mesh, Surface, Texels, Texture, TextureTransform,
-        Triangle, Wrap,
+        Camera, ColorInput, Environment, Instances, Material, Mesh, Surface, Texels, Texture,
+        TextureTransform, Triangle, Wrap,
     };
     use glam::Mat3;
 

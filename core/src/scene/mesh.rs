@@ -1,8 +1,8 @@
 //! Indexed triangle mesh. Positions, normals and texture coordinates share one index per vertex.
 
-use super::instance::Instances;
+use super::instance::{Instance, Prototype, part};
 use super::overlap::Overlap;
-use crate::geometry::Bounds;
+use crate::geometry::{Bounds, MISS};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
@@ -33,6 +33,25 @@ pub struct Mesh<'a> {
     pub instances: Instances<'a>,
 }
 
+/// Borrowed prototypes and their instances.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Instances<'a> {
+    /// Vertex positions of all prototypes, in their own spaces.
+    pub positions: &'a [[f32; 3]],
+    /// Unit shading normals, one for each position, or empty.
+    pub normals: &'a [[f32; 3]],
+    /// Texture coordinates, one for each position, or empty.
+    pub texcoords: &'a [[f32; 2]],
+    /// Triangles of all prototypes. None emits.
+    pub triangles: &'a [Triangle],
+    /// Overlaps of all prototypes.
+    pub overlaps: &'a [Overlap],
+    /// Ranges of the prototypes.
+    pub prototypes: &'a [Prototype],
+    /// Instances, as [`Instances::number`] numbers them.
+    pub placed: &'a [Instance],
+}
+
 impl<'a> Mesh<'a> {
     /// Checks the indices. The error is the index of the first triangle with a vertex or material that does
     /// not exist, or 0 if `normals` or `texcoords` are neither empty nor as long as `positions`, or if the
@@ -47,7 +66,8 @@ impl<'a> Mesh<'a> {
             t.vertices.iter().any(|&v| v as usize >= vertices) || t.material as usize >= materials
         };
         self.triangles.iter().position(broken).map_or(Ok(()), Err)?;
-        let are_valid = self.instances.is_empty() || self.instances.are_valid(self.triangles.len(), materials);
+        let are_valid =
+            self.instances.is_empty() || self.instances.are_valid(self.triangles.len(), materials);
         if are_valid { Ok(()) } else { Err(0) }
     }
 
@@ -111,5 +131,87 @@ impl<'a> Mesh<'a> {
             Some(triangle) => triangle.vertices.map(at),
             None => self.placed_triangle(index).map_or([Vec2::ZERO; 3], |t| t.texcoords.map(Vec2::from)),
         }
+    }
+}
+
+impl<'a> Instances<'a> {
+    /// Nothing.
+    pub const NONE: Self = Self {
+        positions: &[],
+        normals: &[],
+        texcoords: &[],
+        triangles: &[],
+        overlaps: &[],
+        prototypes: &[],
+        placed: &[],
+    };
+
+    /// Mesh of a prototype in its own space; empty without such a prototype.
+    #[inline]
+    pub fn prototype(&self, number: u32) -> Mesh<'a> {
+        let Some(ranges) = self.prototypes.get(number as usize) else { return Mesh::default() };
+        Mesh {
+            positions: part(self.positions, ranges.vertices),
+            normals: part(self.normals, ranges.vertices),
+            texcoords: part(self.texcoords, ranges.vertices),
+            triangles: part(self.triangles, ranges.triangles),
+            overlaps: part(self.overlaps, ranges.overlaps),
+            instances: Instances::NONE,
+        }
+    }
+
+    /// Gives the triangles of `placed` their indices, after `triangles` in world space. The error is the
+    /// number of the first instance whose indices exceed 32 bits or whose prototype does not exist.
+    pub fn number(triangles: usize, prototypes: &[Prototype], placed: &mut [Instance]) -> Result<(), usize> {
+        let mut next = triangles as u64;
+        for (number, instance) in placed.iter_mut().enumerate() {
+            let prototype = prototypes.get(instance.prototype as usize).ok_or(number)?;
+            instance.first = u32::try_from(next).map_err(|_| number)?;
+            next += u64::from(prototype.triangles[1].saturating_sub(prototype.triangles[0]));
+            if next >= u64::from(MISS) {
+                return Err(number);
+            }
+        }
+        Ok(())
+    }
+
+    /// True if prototypes and instances fit together, for `triangles` in world space and `materials`.
+    pub(super) fn are_valid(&self, triangles: usize, materials: usize) -> bool {
+        let mut next = triangles as u64;
+        let is_next = self.placed.iter().all(|instance| {
+            let first = core::mem::replace(
+                &mut next,
+                u64::from(instance.first) + self.prototype(instance.prototype).triangles.len() as u64,
+            );
+            u64::from(instance.first) == first && (instance.prototype as usize) < self.prototypes.len()
+        });
+        let mut numbers = 0..self.prototypes.len() as u32;
+        is_next
+            && next < u64::from(MISS)
+            && numbers.all(|number| self.prototype(number).validate(materials).is_ok())
+    }
+
+    /// First triangle of a prototype among those of all prototypes.
+    pub(crate) fn first_triangle_of(&self, prototype: u32) -> u32 {
+        self.prototypes.get(prototype as usize).map_or(0, |prototype| prototype.triangles[0])
+    }
+
+    /// Bounds of an instance in world space: those of its prototype, placed.
+    pub fn bounds(&self, instance: &Instance) -> Bounds {
+        let ends = self.prototypes.get(instance.prototype as usize).map(|prototype| prototype.ends);
+        let Some(ends) = ends.filter(|[low, high]| low[0] <= high[0]) else { return Bounds::EMPTY };
+        let corner = |i: usize| instance.position([0, 1, 2].map(|axis| ends[i >> axis & 1][axis]));
+        Bounds::around((0..8).map(corner))
+    }
+
+    /// True if nothing is placed.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.placed.is_empty()
+    }
+
+    /// Number of the triangles of all instances.
+    pub fn triangle_count(&self) -> u64 {
+        self.placed.iter().map(|i| self.prototype(i.prototype).triangles.len() as u64).sum()
     }
 }

@@ -28,8 +28,7 @@ impl Scene<'_> {
         };
         let base = hit.triangle - local;
         let first = all.partition_point(|overlap| overlap.triangle < local);
-        let mut overlaps =
-            all.iter().skip(first).take_while(|overlap| overlap.triangle == local).peekable();
+        let mut overlaps = all.iter().skip(first).take_while(|overlap| overlap.triangle == local).peekable();
         if overlaps.peek().is_none() {
             return hit;
         }

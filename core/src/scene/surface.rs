@@ -2,7 +2,7 @@
 //! leave the surface without hitting it again. Blocks of them are computed in lanes, with the same bits
 //! (`halflight_simd::kernels::shade::surface`).
 
-use super::instance::PlacedTriangle;
+use super::placed::PlacedTriangle;
 use super::{Material, NormalMap, Scene, Triangle};
 use crate::features::Features;
 use crate::geometry::{Frame, Hit, Ray};

@@ -7,7 +7,9 @@ use super::scene::{LoadedScene, RenderSettings};
 use super::scene_file::EnvironmentChange;
 use super::texcoords::Texcoords;
 use super::{LoadError, LoadOptions, SceneBuilder, count_vertices, too_large};
-use super::{duplicate_emitters, fit, geometry, memory_estimate, open_glass, overlaps, surface, touching_glass};
+use super::{
+    duplicate_emitters, fit, geometry, memory_estimate, open_glass, overlaps, surface, touching_glass,
+};
 use core::ops::Range;
 use halflight_core::scene::{Environment, Material};
 use std::path::Path;

@@ -214,7 +214,12 @@ impl Builder {
 }
 
 /// Instance from the space of a prototype, which `own` has from the file, to that of the scene.
-fn instance(prototype: u32, placement: &Placement, own: &SceneTransform, world: &SceneTransform) -> Option<Instance> {
+fn instance(
+    prototype: u32,
+    placement: &Placement,
+    own: &SceneTransform,
+    world: &SceneTransform,
+) -> Option<Instance> {
     let factor = world.length(1.0) / own.length(1.0);
     let linear: DMat3 = placement.linear * factor;
     let middle = DVec3::from(world.point_f64(placement.point(own.offset)));

@@ -23,7 +23,11 @@ impl Files {
     }
 
     pub(crate) fn load(&self, name: &str) -> Result<LoadedScene, LoadError> {
-        load(&self.0.join(name), &LoadOptions::default())
+        self.load_with(name, &LoadOptions::default())
+    }
+
+    pub(crate) fn load_with(&self, name: &str, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
+        load(&self.0.join(name), options)
     }
 }
 

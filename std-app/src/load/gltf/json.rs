@@ -54,7 +54,16 @@ objects! {
         skin: Option<usize>,
         extensions: OfNode,
     }
-    OfNode { #[serde(rename = "KHR_lights_punctual")] light: Option<LightOfNode>, }
+    OfNode {
+        #[serde(rename = "KHR_lights_punctual")] light: Option<LightOfNode>,
+        #[serde(rename = "EXT_mesh_gpu_instancing")] instancing: Option<Box<Instancing>>,
+    }
+    Instancing { attributes: OfInstances, }
+    OfInstances {
+        #[serde(rename = "TRANSLATION")] translation: Option<usize>,
+        #[serde(rename = "ROTATION")] rotation: Option<usize>,
+        #[serde(rename = "SCALE")] scale: Option<usize>,
+    }
     LightOfNode { light: usize, }
     Mesh { primitives: Vec<Primitive>, weights: Vec<f64>, }
     Primitive {
@@ -168,7 +177,7 @@ objects! {
 }
 
 /// Extensions that are read, or that change nothing in a picture.
-pub(super) const READ: [&str; 14] = [
+pub(super) const READ: [&str; 15] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -179,6 +188,7 @@ pub(super) const READ: [&str; 14] = [
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_xmp",
     "KHR_xmp_json_ld",

@@ -1,7 +1,7 @@
 //! The hierarchy of nodes: placement of meshes, cameras and lights in the world, and poses of skins.
 
 use super::accessor::{Buffers, Rows};
-use super::json::{Document, Node};
+use super::json::{Document, Node, OfInstances};
 use super::material::Materials;
 use super::{Model, Source, light, mesh};
 use crate::load::error::LoadError;
@@ -109,11 +109,16 @@ fn local(node: &Node) -> Placement {
     if let Some(matrix) = &node.matrix {
         return of_matrix(matrix);
     }
-    let [x, y, z, w] = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    of_parts(node.translation, node.rotation, node.scale)
+}
+
+/// Scaled, then rotated by a quaternion x, y, z, w, then translated.
+fn of_parts(translation: [f64; 3], rotation: Option<[f64; 4]>, scale: Option<[f64; 3]>) -> Placement {
+    let [x, y, z, w] = rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
     let rotation = DQuat::from_xyzw(x, y, z, w);
     let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
-    let scale = DMat3::from_diagonal(node.scale.unwrap_or([1.0; 3]).into());
-    Placement { linear: DMat3::from_quat(rotation) * scale, offset: node.translation.into() }
+    let scale = DMat3::from_diagonal(scale.unwrap_or([1.0; 3]).into());
+    Placement { linear: DMat3::from_quat(rotation) * scale, offset: translation.into() }
 }
 
 /// The transform of a matrix in columns.
@@ -151,11 +156,51 @@ impl Builder<'_> {
                 self.model.meshes.len() - 1
             }
         };
-        source.take(PART * (1 + self.model.meshes[index].len()))?;
+        let bytes = PART * (1 + self.model.meshes[index].len());
         // Joints place a mesh in the world.
         let placement = if skin.is_some() { Placement::IDENTITY } else { placement };
-        self.model.instances.push((node.name.clone(), index, placement));
+        let Some(instancing) = &node.extensions.instancing else {
+            source.take(bytes)?;
+            self.model.instances.push((node.name.clone(), index, placement));
+            return Ok(());
+        };
+        for inner in self.instances(&instancing.attributes, bytes, source)? {
+            self.model.instances.push((node.name.clone(), index, placement.of(&inner)));
+        }
         Ok(())
+    }
+
+    /// Placements of the instances of a node (`EXT_mesh_gpu_instancing`), each of which takes `bytes`.
+    fn instances(
+        &self,
+        attributes: &OfInstances,
+        bytes: usize,
+        source: &mut Source,
+    ) -> Result<Vec<Placement>, LoadError> {
+        let OfInstances { translation, rotation, scale } = *attributes;
+        let translations = translation.map(|number| self.buffers.rows::<3>(number)).transpose()?;
+        let rotations = rotation.map(|number| self.buffers.rows::<4>(number)).transpose()?;
+        let scales = scale.map(|number| self.buffers.rows::<3>(number)).transpose()?;
+        let counts = [
+            translations.as_ref().map(|rows| rows.count),
+            rotations.as_ref().map(|rows| rows.count),
+            scales.as_ref().map(|rows| rows.count),
+        ];
+        let mut counts = counts.into_iter().flatten();
+        let count = counts.next().unwrap_or(0);
+        if counts.any(|other| other != count) {
+            return Err(self.buffers.error("the attributes of instances differ in their counts"));
+        }
+        source.take(count.saturating_mul(bytes + size_of::<Placement>()))?;
+        let placement = |i| {
+            let translation = translations.as_ref().map_or([0.0; 3], |rows| rows.row(i));
+            of_parts(
+                translation,
+                rotations.as_ref().map(|rows| rows.row(i)),
+                scales.as_ref().map(|rows| rows.row(i)),
+            )
+        };
+        Ok((0..count).map(placement).collect())
     }
 
     /// Groups of a mesh.

@@ -37,6 +37,43 @@ fn nodes_place_meshes_one_within_the_other() {
 }
 
 #[test]
+fn instances_of_a_node_are_placed_within_it() {
+    let mut file = triangle(json!([{ "mesh": 0, "translation": [10, 0, 0] }]));
+    let translation = file.floats("VEC3", &[0., 0., 0., 1., 2., 3.]);
+    let rotation = file.floats("VEC4", &[0., 0., 0., 1., 0., 0., 1., 1.]);
+    let attributes = json!({ "TRANSLATION": translation, "ROTATION": rotation });
+    file.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    file.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    file.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+    let scene = file.loaded();
+    assert_eq!(corners(&scene, 0), [[10., 0., 0.], [11., 0., 0.], [10., 1., 0.]]);
+    assert_eq!(corners(&scene, 1), [[11., 2., 3.], [11., 3., 3.], [10., 2., 3.]]);
+    assert!(scene.repairs.is_empty(), "{:?}", scene.repairs);
+
+    let scale = file.floats("VEC3", &[1.0; 9]);
+    file.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] = scale.into();
+    let error = file.load().unwrap_err().to_string();
+    assert!(error.contains("differ in their counts"), "{error}");
+}
+
+#[test]
+fn nodes_that_use_one_large_mesh_share_its_memory() {
+    // 300 triangles, more than 2^18 / 300 times.
+    let mut file = Gltf::new(json!([{ "mesh": 0 }, { "mesh": 0, "translation": [0, 0, 9] }]));
+    let corners: Vec<f32> =
+        (0..300).flat_map(|i| [i as f32, 0., 0., i as f32, 1., 0., i as f32, 0., 1.]).collect();
+    let position = file.floats("VEC3", &corners);
+    file.json["meshes"] = json!([{ "primitives": [{ "attributes": { "POSITION": position } }] }]);
+    assert_eq!(file.loaded().instances.placed.len(), 0);
+    let translation = file.floats("VEC3", &vec![1.0; 3 * 900]);
+    file.json["nodes"][0]["extensions"] =
+        json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": translation } } });
+    let scene = file.loaded();
+    assert_eq!((scene.instances.placed.len(), scene.instances.triangles.len()), (901, 300));
+    assert!(scene.triangles.is_empty());
+}
+
+#[test]
 fn cycles_and_second_parents_end() {
     let mut file = triangle(json!([{ "mesh": 0, "children": [1, 1, 7] }, { "mesh": 0, "children": [0] }]));
     file.json["scenes"][0]["nodes"] = json!([0]);

@@ -152,7 +152,7 @@ impl Reconstruction {
         let [width, height] = self.size;
         let settings = PathSettings { width, height, seed: self.seed, max_depth: UNLIMITED };
         let level = Level::detect();
-        let mut memory = Pages::new(Bvh::footprint(scene.mesh.triangles.len()))?;
+        let mut memory = Pages::new(Bvh::footprint_of(&scene.mesh))?;
         let bvh = Bvh::build_with(&scene.mesh, &mut Arena::over(&mut memory), level, &Serial)?;
         let mut memory = Pages::new(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)))?;
         let lights = LightSampler::build(&scene, &mut Arena::over(&mut memory))?.with_level(level);

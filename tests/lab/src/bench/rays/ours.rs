@@ -11,7 +11,7 @@ use halflight_core::scene::Mesh;
 
 /// BVH as in a render: built in new memory, copied to `kept`; the memory of the build is freed.
 pub(super) fn build<'m>(mesh: &Mesh, level: Level, kept: &'m mut Pages) -> Result<Bvh<'m>, OutOfMemory> {
-    let mut working = Pages::new(Bvh::footprint(mesh.triangles.len()))?;
+    let mut working = Pages::new(Bvh::footprint_of(mesh))?;
     let mut arena = Arena::over(&mut working);
     let built = Bvh::build_with(mesh, &mut arena, level, &Serial)?;
     *kept = Pages::new(built.used())?;

@@ -94,7 +94,7 @@ impl Irradiance {
             max_depth: self.max_depth.or(loaded.settings.max_depth.map(u32::from)).unwrap_or(u32::MAX),
         };
         let level = Level::detect();
-        let mut memory = Pages::new(Bvh::footprint(scene.mesh.triangles.len()))?;
+        let mut memory = Pages::new(Bvh::footprint_of(&scene.mesh))?;
         let bvh = Bvh::build_with(&scene.mesh, &mut Arena::over(&mut memory), level, &Serial)?;
         let mut memory = Pages::new(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)))?;
         let lights = LightSampler::build(&scene, &mut Arena::over(&mut memory))?.with_level(level);

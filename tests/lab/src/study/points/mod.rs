@@ -85,7 +85,7 @@ impl Points {
         let views = loaded.views();
         let scene = &views.scene(loaded.camera_or_default());
         let level = Level::detect();
-        let mut memory = Pages::new(Bvh::footprint(scene.mesh.triangles.len()))?;
+        let mut memory = Pages::new(Bvh::footprint_of(&scene.mesh))?;
         let bvh = Bvh::build_with(&scene.mesh, &mut Arena::over(&mut memory), level, &Serial)?;
         let mut memory = Pages::new(LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
         let lights = LightSampler::build(scene, &mut Arena::over(&mut memory))?.with_level(level);
