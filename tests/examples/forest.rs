@@ -5,8 +5,8 @@
 //! `copies.toml`, where they do not, with the meshes and materials. Then for example
 //! `halflight render FOLDER/forest.toml --spp 16 -o forest.exr --json`.
 
-use std::f64::consts::{PI, TAU};
-use std::fmt::Write;
+use core::f64::consts::{PI, TAU};
+use core::fmt::Write;
 use std::path::Path;
 use std::{env, fs, io};
 

@@ -1,20 +1,20 @@
 //! Meshes that are placed several times: as instances, which share memory, and as copies.
 
 use crate::load_support::Files;
+use core::f64::consts::PI;
 use core::fmt::Write;
 use glam::Vec3;
 use halflight::load::{LoadOptions, LoadedScene};
 use halflight::render::Method;
 use halflight_core::Level;
+use halflight_core::bsdf::All;
 use halflight_core::bvh::Coherence;
-use halflight_core::features::All;
 use halflight_core::geometry::{Hit, Ray};
+use halflight_core::sampling::Sampler;
 use halflight_core::scene::SurfacePoint;
-use halflight_test_support::Random;
 use halflight_tests::memory::with_structures;
 use halflight_tests::render::{blocks_of, render};
 use halflight_tests::statistics::agree;
-use std::f64::consts::PI;
 
 const MATERIALS: &str = "newmtl wall\nKd .6 .6 .6\nnewmtl lamp\nKd 0 0 0\nKe 9 8 7\nnewmtl red\nKd .8 .1 .1\n\
     newmtl green\nKd .1 .8 .1\nnewmtl mirror\nKd 0 0 0\nKs .9 .9 .9\nillum 3\nnewmtl veil\nKd .2 .3 .8\nd .5\n";
@@ -89,10 +89,11 @@ fn rays_meet_instances_where_they_meet_copies() {
     let count = copies.triangles.len();
     assert_eq!(shared.mesh().triangle_count(), count as u64);
     assert!(shared.mesh().unique_triangles() < count / 2);
-    let mut random = Random(3);
     let rays: Vec<Ray> = (0..100_000)
-        .map(|_| {
-            let [from, to] = [(); 2].map(|()| 2.0 * random.point() - 1.0);
+        .map(|i| {
+            let sampler = Sampler::new(3, 0, i);
+            let [[a, b], [c, d], [e, f]] = [0, 2, 4].map(|dimension| sampler.pair(dimension));
+            let (from, to) = (2.0 * Vec3::new(a, b, c) - 1.0, 2.0 * Vec3::new(d, e, f) - 1.0);
             Ray::new(from, (to - from).normalize())
         })
         .collect();
