@@ -1,8 +1,8 @@
 //! Forest for measurements of instances: trees of about 100,000 triangles that are placed many times.
 //!
 //! `cargo run --release -p halflight-tests --example forest -- FOLDER [TREES [TRIANGLES [KINDS]]]`, by
-//! default 1000 trees of 100,000 triangles and 4 kinds. Writes `forest.toml`, where the trees share their memory, and
-//! `copies.toml`, where they do not, with the meshes and materials. Then for example
+//! default 1000 trees of 100,000 triangles and 4 kinds. Writes `forest.toml`, where the trees share their
+//! memory, and `copies.toml`, where they do not, with the meshes and materials. Then for example
 //! `halflight render FOLDER/forest.toml --spp 16 -o forest.exr --json`.
 
 use core::f64::consts::{PI, TAU};

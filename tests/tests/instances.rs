@@ -54,10 +54,11 @@ fn thing() -> String {
 }
 
 /// Placed as it is, turned and flattened, mirrored, and sheared.
-const INSTANCES: &str = "instances = [\n{ translate = [-1, 0, -.8] },\n\
-    { scale = [1.2, .8, .6], rotate = { axis = [0, 1, .2], degrees = 130 }, translate = [1, .3, -.7] },\n\
-    { scale = [-.8, .8, .8], translate = [-.3, 0, .6] },\n\
-    { matrix = [[.7, .3, 0, .9], [0, .7, 0, .1], [.2, 0, .7, .8]] },\n]\n";
+const INSTANCES: &str = "instances = [\n{ translate = [-1, 0, -0.8] },\n\
+    { scale = [1.2, 0.8, 0.6], rotate = { axis = [0, 1, 0.2], degrees = 130 }, \
+      translate = [1, 0.3, -0.7] },\n\
+    { scale = [-0.8, 0.8, 0.8], translate = [-0.3, 0, 0.6] },\n\
+    { matrix = [[0.7, 0.3, 0, 0.9], [0, 0.7, 0, 0.1], [0.2, 0, 0.7, 0.8]] },\n]\n";
 
 fn files(share: &str) -> Files {
     let scene = format!(

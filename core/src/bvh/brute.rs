@@ -12,7 +12,7 @@ pub fn intersect(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<(f32, f32, f32)> {
     triangles::intersect(ray.origin, &Shear::new(ray.direction), ray.t_max, corners)
 }
 
-/// Nearest hit among all triangles, those of instances included; among hits at equal distance the lowest index.
+/// Nearest hit among all triangles and those of instances; among hits at equal distance the lowest index.
 pub fn nearest(mesh: &Mesh, ray: &Ray) -> Hit {
     let mut best = Hit { t: ray.t_max, u: 0.0, v: 0.0, triangle: MISS };
     if !traceable(ray) {

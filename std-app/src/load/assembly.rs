@@ -1,8 +1,12 @@
 //! A scene from its files: materials, one mesh in the coordinates of the core, and instances.
 
-use super::instances::{self, Shared};
+use super::buffers::Geometry;
+use super::instances::{self, Palette, Shared};
+use super::memory_estimate::of_scene;
 use super::mtl::MtlMaterial;
-use super::placed::{Placed, PlacedMesh};
+use super::notes::Notes;
+use super::overlaps::Pair;
+use super::placed::PlacedMesh;
 use super::scene::{LoadedScene, RenderSettings};
 use super::scene_file::EnvironmentChange;
 use super::texcoords::Texcoords;
@@ -56,46 +60,25 @@ impl SceneBuilder {
             map: textures.colour(entry.map.as_ref()),
             to_map: entry.to_map,
         });
-
-        let derived = textures.derived_bytes();
-        self.budget.take(derived).map_err(|why| too_large(path, &why))?;
-
+        self.budget.take(textures.derived_bytes()).map_err(|why| too_large(path, &why))?;
         let shared = match options.copies || options.keeps_texcoords {
             true => Shared::none(&self.meshes),
             false => Shared::of(&self.meshes, &self.objs, &materials, notes),
         };
-        let (mut parts, mut placed) = (Vec::new(), Vec::new());
-        for (number, mesh) in self.meshes.iter().enumerate() {
-            for group in &self.objs[mesh.obj].groups {
-                let material = mesh.material_of(group);
-                let texcoords = texcoords[material as usize];
-                let part = Placed { group, placement: mesh.placement, material, texcoords };
-                if shared.has(number) { placed.push(part) } else { parts.push(part) }
-            }
-        }
         // Instances extend the scene as copies do.
-        let in_world = parts.len();
-        parts.extend(placed);
+        let (mut parts, in_world) = shared.placed(&self.meshes, &self.objs, &texcoords);
         let fit = fit::Fit::of(&parts);
         parts.truncate(in_world);
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
         let prototypes = shared.parts(&self.meshes, &self.objs, &texcoords);
-        let bytes = prototypes.iter().map(|parts| memory_estimate::of_scene(parts, &materials)).sum();
-        self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
         let pieces = geometry::pieces(&parts, &fit);
-        let bytes =
-            memory_estimate::of_scene(&parts, &materials).saturating_add(memory_estimate::of_pieces(pieces));
+        let estimates = prototypes.iter().chain([&parts]).map(|parts| of_scene(parts, &materials));
+        let bytes = estimates.sum::<usize>().saturating_add(memory_estimate::of_pieces(pieces));
         self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
         let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
         let mut names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
-        let mut overlaps = overlaps::locate(&geometry, &materials);
-        if duplicate_emitters::remove(&mut geometry, &overlaps, &materials, &names, notes) {
-            overlaps = overlaps::locate(&geometry, &materials);
-        }
-        overlaps::note(&overlaps, &geometry.triangles, &materials, &names, notes);
-        touching_glass::relate(&mut geometry, &overlaps, &mut materials, &mut names, notes);
-        open_glass::note(&geometry, &materials, &names, notes);
+        let overlaps = repair(&mut geometry, (&mut materials, &mut names), notes);
         let mut instances = instances::Builder::default();
         for parts in &prototypes {
             instances.add(parts, (&mut materials, &mut names), notes);
@@ -127,6 +110,18 @@ impl SceneBuilder {
         };
         Ok(loaded.with_first_camera())
     }
+}
+
+/// Repairs triangles in one plane; notes those, and dielectrics that are open. Returns the overlaps.
+fn repair(geometry: &mut Geometry, (materials, names): Palette, notes: &mut Notes) -> Vec<Pair> {
+    let mut overlaps = overlaps::locate(geometry, materials);
+    if duplicate_emitters::remove(geometry, &overlaps, materials, names, notes) {
+        overlaps = overlaps::locate(geometry, materials);
+    }
+    overlaps::note(&overlaps, &geometry.triangles, materials, names, notes);
+    touching_glass::relate(geometry, &overlaps, materials, names, notes);
+    open_glass::note(geometry, materials, names, notes);
+    overlaps
 }
 
 fn too_many_triangles(path: &Path, count: u64) -> LoadError {

@@ -113,6 +113,27 @@ impl Shared {
         self.of_mesh[number].is_some()
     }
 
+    /// Parts of all meshes, placed; those that are no instances come first, and their number.
+    pub(super) fn placed<'a>(
+        &self,
+        meshes: &[PlacedMesh],
+        objs: &'a [Obj],
+        texcoords: &[Texcoords],
+    ) -> (Vec<Placed<'a>>, usize) {
+        let (mut parts, mut placed) = (Vec::new(), Vec::new());
+        for (mesh, prototype) in meshes.iter().zip(&self.of_mesh) {
+            for group in &objs[mesh.obj].groups {
+                let material = mesh.material_of(group);
+                let texcoords = texcoords[material as usize];
+                let part = Placed { group, placement: mesh.placement, material, texcoords };
+                if prototype.is_some() { placed.push(part) } else { parts.push(part) }
+            }
+        }
+        let in_world = parts.len();
+        parts.extend(placed);
+        (parts, in_world)
+    }
+
     /// Parts of all prototypes in their own spaces, prototype by prototype.
     pub(super) fn parts<'a>(
         &self,
