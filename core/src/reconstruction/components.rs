@@ -28,7 +28,7 @@ const PLANE_NORMAL: f32 = 1e-3;
 const NONE: u32 = u32::MAX;
 
 /// Component of each triangle: the lowest index of its triangles.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SurfaceComponents<'m> {
     components: &'m [u32],
 }

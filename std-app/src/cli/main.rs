@@ -10,6 +10,7 @@ mod compare;
 mod failure;
 mod info;
 mod interrupt;
+mod layer_args;
 mod merge;
 mod outputs;
 mod picture_args;

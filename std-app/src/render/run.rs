@@ -10,8 +10,8 @@ use super::picture::{self, Picture};
 use super::setup::RenderSetup;
 use super::threads::{Pool, Workers};
 use super::{
-    Ending, MOST_PIXELS, Method, Progress, Reconstruct, RenderError, RenderResult, Seconds, Settings,
-    environment_visibility, gaps, reconstruction,
+    Ending, Layers, MOST_PIXELS, Method, Progress, Reconstruct, RenderError, RenderResult, Seconds, Settings,
+    environment_visibility, gaps, layers, reconstruction,
 };
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
@@ -153,6 +153,7 @@ impl WithFeatures for Render<'_> {
         let pilots = (!affords_pilots).then(|| Finding::new("pilots", LeftOut, "there is too little time"));
         let setup = RenderSetup { lights, settings, ..plain };
         let tracer = setup.paths::<F>(settings.seed);
+        let surfaces = layers::surfaces::<F>(&setup, &mut memory)?;
         let sketch = |workers: &Workers| gaps::sketch(&tracer, [settings.width, settings.height], workers);
         let is_open = settings.method.is_none() && resumed.is_none();
         let mut plan = if is_open { MethodPlan::open() } else { MethodPlan::from(method) };
@@ -199,7 +200,8 @@ impl WithFeatures for Render<'_> {
             let seconds = Seconds { build: built.seconds(), ..done.seconds };
             let findings = Findings::default().and(pilots).and(visibility).and(done.findings).and(raw);
             let (memory, memory_peak) = (own.uses(), own.peak());
-            return Ok(RenderResult { memory, memory_peak, seconds, findings, ..done });
+            let layers = Layers { surfaces, ..done.layers };
+            return Ok(RenderResult { layers, memory, memory_peak, seconds, findings, ..done });
         }
     }
 }

@@ -1,0 +1,158 @@
+//! Layers of a picture: the surfaces of each pixel, for compositing and for denoisers.
+//!
+//! Albedo and normal are those behind smooth mirrors and glass, as a denoiser needs them (Áfra, Open Image
+//! Denoise, 2019). Depth, position, material and object are those of the first surface. Rays pass cut-outs and
+//! panes by the probability of their transparency.
+//!
+//! 1. The rays of the search of surfaces find the means of a pixel, so that films keep the same values.
+//! 2. Where these rays hit several materials or objects, more rays find the fractions of both.
+
+use super::chains::{Batch, Seen};
+use super::first_surfaces::{BAND, BATCH, EDGE_RAYS, FirstSurfaces, RAYS, mean, ranks};
+use crate::bsdf::Features;
+use crate::memory::{Arena, OutOfMemory};
+use crate::method::Executor;
+use crate::transport::Counters;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Materials and objects of a pixel that are kept.
+pub const RANKS: usize = 6;
+
+/// Number of no material and of no object.
+pub const NO_ID: u32 = u32::MAX;
+
+/// A material or an object, and the fraction of the pixel that it covers.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Coverage {
+    /// Its number; [`NO_ID`] where a slot is empty.
+    pub id: u32,
+    /// Fraction of the pixel, 0 to 1.
+    pub fraction: f32,
+}
+
+impl Default for Coverage {
+    fn default() -> Self {
+        Self { id: NO_ID, fraction: 0.0 }
+    }
+}
+
+/// Means over a pixel of the surfaces that it sees. Rays that escape have albedo 1, no normal, and no part in
+/// depth, position, materials and objects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PixelLayers {
+    /// Albedo behind mirrors and smooth glass, 0 to 1.
+    pub albedo: [f32; 3],
+    /// Shading normal there, towards the viewer; shorter than 1 where the pixel sees several.
+    pub normal: [f32; 3],
+    /// Distance of the first surface from the camera along the ray; 0 if all rays escape.
+    pub depth: f32,
+    /// Position of the first surface; 0 if all rays escape.
+    pub position: [f32; 3],
+    /// Materials of the first surface, most frequent first.
+    pub materials: [Coverage; RANKS],
+    /// Objects of the first surface, most frequent first.
+    pub objects: [Coverage; RANKS],
+}
+
+impl<F: Features> FirstSurfaces<'_, F> {
+    /// Finds the layers of all pixels, row by row from the top. `objects`: object of each triangle, or empty.
+    /// False if the executor ended early: `out` then has pixels without values.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] if the executor has less than [`FirstSurfaces::scratch`].
+    pub fn layers(
+        &self,
+        objects: &[u32],
+        out: &mut [PixelLayers],
+        executor: &mut impl Executor,
+    ) -> Result<bool, OutOfMemory> {
+        let band = BAND * self.size[0].max(1) as usize;
+        let passed = executor.pass(out.chunks_mut(band), |number, pixels, worker| {
+            self.layers_of_band(number * band, pixels, objects, &mut worker.scratch)
+        })?;
+        Ok(passed.is_complete)
+    }
+
+    /// The pixels of a band from index `first`.
+    fn layers_of_band(
+        &self,
+        first: usize,
+        pixels: &mut [PixelLayers],
+        objects: &[u32],
+        scratch: &mut Arena,
+    ) -> Result<Counters, OutOfMemory> {
+        const PIXELS: usize = BATCH / RAYS;
+        let mut arena = scratch.scratch();
+        let mut batch = Batch::new(BATCH, &mut arena)?;
+        let numbers = arena.slice::<u32>(EDGE_RAYS[0])?;
+        let mut counters = Counters::default();
+        for (part, pixels) in pixels.chunks_mut(PIXELS).enumerate() {
+            let first = first + part * PIXELS;
+            counters.rays += self.trace(&mut batch, pixels.len(), RAYS, true, |i| first + i);
+            // The camera rays again: the trace has replaced them.
+            let count = (pixels.len() * RAYS).min(batch.rays.len());
+            self.aim(&mut batch.rays[..count], |ray| ((first + ray / RAYS) as u32, (ray % RAYS) as u32));
+            let seen = batch.seen.chunks(RAYS).zip(batch.rays.chunks(RAYS));
+            for (pixel, (seen, rays)) in pixels.iter_mut().zip(seen) {
+                let means = mean(seen);
+                (pixel.albedo, pixel.normal) = (means.albedo, means.normal);
+                (pixel.depth, pixel.position) = self.first_points(seen, rays);
+                self.count(seen, objects, numbers, pixel);
+            }
+            for (i, pixel) in pixels.iter_mut().enumerate().filter(|(_, pixel)| pixel.is_mixed()) {
+                counters.rays += self.trace(&mut batch, 1, EDGE_RAYS[0], false, |_| first + i);
+                let count = EDGE_RAYS[0].min(batch.seen.len());
+                self.count(&batch.seen[..count], objects, numbers, pixel);
+            }
+        }
+        Ok(counters)
+    }
+
+    /// Mean distance from the camera and mean position of first surfaces.
+    fn first_points(&self, seen: &[Seen], rays: &[crate::geometry::Ray]) -> (f32, [f32; 3]) {
+        let (mut depth, mut position, mut hits) = (0.0, Vec3::ZERO, 0.0);
+        for (seen, ray) in seen.iter().zip(rays).filter(|(seen, _)| seen.first != NO_ID) {
+            let direction = Vec3::from(ray.direction);
+            position += Vec3::from(ray.origin) + seen.depth * direction;
+            // Rays of a far camera start on their way.
+            let before = self.camera.start.map_or(0.0, |start| start.depth);
+            depth += seen.depth + before / direction.dot(self.camera.forward);
+            hits += 1.0;
+        }
+        if hits > 0.0 { (depth / hits, (position / hits).to_array()) } else { Default::default() }
+    }
+
+    /// Counts the materials and objects of the rays of a pixel.
+    fn count(&self, seen: &[Seen], objects: &[u32], numbers: &mut [u32], pixel: &mut PixelLayers) {
+        let triangles = self.chains.context.scene.mesh.triangles;
+        pixel.materials = coverage(seen, numbers, |triangle| {
+            triangles.get(triangle as usize).map_or(NO_ID, |triangle| triangle.material)
+        });
+        pixel.objects =
+            coverage(seen, numbers, |triangle| objects.get(triangle as usize).copied().unwrap_or(NO_ID));
+    }
+}
+
+impl PixelLayers {
+    /// True if its rays see several materials or objects, or escape in part.
+    fn is_mixed(&self) -> bool {
+        [self.materials[0], self.objects[0]].iter().any(|most| most.fraction > 0.0 && most.fraction < 1.0)
+    }
+}
+
+/// Most frequent numbers of the first triangles of rays, by the fraction of rays.
+fn coverage(seen: &[Seen], numbers: &mut [u32], number: impl Fn(u32) -> u32) -> [Coverage; RANKS] {
+    let mut found = 0;
+    for (slot, id) in
+        numbers.iter_mut().zip(seen.iter().map(|seen| number(seen.first)).filter(|id| *id != NO_ID))
+    {
+        *slot = id;
+        found += 1;
+    }
+    let numbers = numbers.get_mut(..found).unwrap_or_default();
+    let all = seen.len().max(1) as f32;
+    ranks::<RANKS>(numbers).map(|(count, id)| Coverage { id, fraction: count as f32 / all })
+}
