@@ -132,7 +132,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 
     /// True if rays of a pixel or its neighbours disagree.
-    fn is_at_edge(&self, clusters: &[u32], i: usize) -> bool {
+    pub(super) fn is_at_edge(&self, clusters: &[u32], i: usize) -> bool {
         let cluster = clusters.get(i).copied().unwrap_or(NO_CLUSTER);
         cluster == NO_CLUSTER || self.neighbourhood(i).any(|other| clusters.get(other) != Some(&cluster))
     }
@@ -253,7 +253,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
 
 /// Number of rays of each pixel at an edge in a picture of so many `pixels`. A ray of each of these takes
 /// `segments` in all.
-fn edge_rays(pixels: f64, segments: f64) -> usize {
+pub(super) fn edge_rays(pixels: f64, segments: f64) -> usize {
     let [most, least] = EDGE_RAYS;
     let mut rays = most;
     while rays > least && rays as f64 * segments > pixels * EDGE_BUDGET {

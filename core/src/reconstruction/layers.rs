@@ -5,13 +5,16 @@
 //! panes by the probability of their transparency.
 //!
 //! 1. The rays of the search of surfaces find the means of a pixel, so that films keep the same values.
-//! 2. Where these rays hit several materials or objects, more rays find the fractions of both.
+//! 2. Where rays of a pixel or its neighbours hit several materials or objects, more rays find the fractions of
+//!    both.
 
 use super::chains::{Batch, Seen};
-use super::first_surfaces::{BAND, BATCH, EDGE_RAYS, FirstSurfaces, RAYS, mean, ranks};
+use super::first_surfaces::{BAND, BATCH, EDGE_RAYS, FirstSurfaces, RAYS, edge_rays, mean, ranks};
+use super::surfaces::NO_CLUSTER;
 use crate::bsdf::Features;
-use crate::memory::{Arena, OutOfMemory};
+use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::method::Executor;
+use crate::sampling::mix;
 use crate::transport::Counters;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -58,29 +61,48 @@ pub struct PixelLayers {
 }
 
 impl<F: Features> FirstSurfaces<'_, F> {
+    /// Bytes that [`FirstSurfaces::layers`] takes from the arena; none stay taken.
+    pub fn layers_footprint(width: u32, height: u32) -> Footprint {
+        Footprint::default().slice::<u32>(width as usize * height as usize)
+    }
+
     /// Finds the layers of all pixels, row by row from the top. `objects`: object of each triangle, or empty.
     /// False if the executor ended early: `out` then has pixels without values.
     ///
     /// # Errors
-    /// [`OutOfMemory`] if the executor has less than [`FirstSurfaces::scratch`].
+    /// [`OutOfMemory`] if the arena has less than [`FirstSurfaces::layers_footprint`], or the executor less
+    /// than [`FirstSurfaces::scratch`].
     pub fn layers(
         &self,
         objects: &[u32],
         out: &mut [PixelLayers],
+        arena: &mut Arena,
         executor: &mut impl Executor,
     ) -> Result<bool, OutOfMemory> {
+        let keys = arena.slice::<u32>(out.len())?;
         let band = BAND * self.size[0].max(1) as usize;
+        let bands = out.chunks_mut(band).zip(keys.chunks_mut(band));
+        let passed = executor.pass(bands, |number, (pixels, keys), worker| {
+            self.layers_of_band(number * band, (pixels, keys), objects, &mut worker.scratch)
+        })?;
+        if !passed.is_complete {
+            return Ok(false);
+        }
+        let (keys, pixels) = (&*keys, out.len());
+        let edges = (0..pixels).filter(|&i| self.is_at_edge(keys, i)).count();
+        let segments = passed.counters.rays as f64 / (RAYS * pixels.max(1)) as f64;
+        let rays = edge_rays(pixels as f64, edges as f64 * segments);
         let passed = executor.pass(out.chunks_mut(band), |number, pixels, worker| {
-            self.layers_of_band(number * band, pixels, objects, &mut worker.scratch)
+            self.refine_layers(number * band, pixels, (objects, keys, rays), &mut worker.scratch)
         })?;
         Ok(passed.is_complete)
     }
 
-    /// The pixels of a band from index `first`.
+    /// First pass: means of the pixels of a band from index `first`, and a key of their material and object.
     fn layers_of_band(
         &self,
         first: usize,
-        pixels: &mut [PixelLayers],
+        (pixels, keys): (&mut [PixelLayers], &mut [u32]),
         objects: &[u32],
         scratch: &mut Arena,
     ) -> Result<Counters, OutOfMemory> {
@@ -89,24 +111,41 @@ impl<F: Features> FirstSurfaces<'_, F> {
         let mut batch = Batch::new(BATCH, &mut arena)?;
         let numbers = arena.slice::<u32>(EDGE_RAYS[0])?;
         let mut counters = Counters::default();
-        for (part, pixels) in pixels.chunks_mut(PIXELS).enumerate() {
+        let parts = pixels.chunks_mut(PIXELS).zip(keys.chunks_mut(PIXELS));
+        for (part, (pixels, keys)) in parts.enumerate() {
             let first = first + part * PIXELS;
             counters.rays += self.trace(&mut batch, pixels.len(), RAYS, true, |i| first + i);
             // The camera rays again: the trace has replaced them.
             let count = (pixels.len() * RAYS).min(batch.rays.len());
             self.aim(&mut batch.rays[..count], |ray| ((first + ray / RAYS) as u32, (ray % RAYS) as u32));
             let seen = batch.seen.chunks(RAYS).zip(batch.rays.chunks(RAYS));
-            for (pixel, (seen, rays)) in pixels.iter_mut().zip(seen) {
+            for ((pixel, key), (seen, rays)) in pixels.iter_mut().zip(keys).zip(seen) {
                 let means = mean(seen);
                 (pixel.albedo, pixel.normal) = (means.albedo, means.normal);
                 (pixel.depth, pixel.position) = self.first_points(seen, rays);
                 self.count(seen, objects, numbers, pixel);
+                *key = pixel.key();
             }
-            for (i, pixel) in pixels.iter_mut().enumerate().filter(|(_, pixel)| pixel.is_mixed()) {
-                counters.rays += self.trace(&mut batch, 1, EDGE_RAYS[0], false, |_| first + i);
-                let count = EDGE_RAYS[0].min(batch.seen.len());
-                self.count(&batch.seen[..count], objects, numbers, pixel);
-            }
+        }
+        Ok(counters)
+    }
+
+    /// Second pass: fractions of the materials and objects of pixels at edges, by `rays` rays.
+    fn refine_layers(
+        &self,
+        first: usize,
+        pixels: &mut [PixelLayers],
+        (objects, keys, rays): (&[u32], &[u32], usize),
+        scratch: &mut Arena,
+    ) -> Result<Counters, OutOfMemory> {
+        let mut arena = scratch.scratch();
+        let mut batch = Batch::new(BATCH, &mut arena)?;
+        let numbers = arena.slice::<u32>(EDGE_RAYS[0])?;
+        let mut counters = Counters::default();
+        for (i, pixel) in pixels.iter_mut().enumerate().filter(|(i, _)| self.is_at_edge(keys, first + i)) {
+            counters.rays += self.trace(&mut batch, 1, rays, false, |_| first + i);
+            let count = rays.min(batch.seen.len());
+            self.count(&batch.seen[..count], objects, numbers, pixel);
         }
         Ok(counters)
     }
@@ -137,9 +176,16 @@ impl<F: Features> FirstSurfaces<'_, F> {
 }
 
 impl PixelLayers {
-    /// True if its rays see several materials or objects, or escape in part.
-    fn is_mixed(&self) -> bool {
-        [self.materials[0], self.objects[0]].iter().any(|most| most.fraction > 0.0 && most.fraction < 1.0)
+    /// Hash of the material and the object that all rays hit; [`NO_CLUSTER`] if they hit several.
+    fn key(&self) -> u32 {
+        let [material, object] = [self.materials[0], self.objects[0]];
+        if [material, object].iter().any(|most| most.fraction > 0.0 && most.fraction < 1.0) {
+            return NO_CLUSTER;
+        }
+        match (mix(u64::from(material.id) << 32 | u64::from(object.id)) >> 32) as u32 {
+            NO_CLUSTER => 0,
+            key => key,
+        }
     }
 }
 

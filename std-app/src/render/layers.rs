@@ -7,7 +7,7 @@ use super::threads::Threads;
 use crate::load::LoadedScene;
 use crate::save::Image;
 use halflight_core::bsdf::Features;
-use halflight_core::memory::Footprint;
+use halflight_core::memory::{Arena, Footprint};
 use halflight_core::reconstruction::{FirstSurfaces, PixelLayers, SurfaceComponents};
 
 /// A layer beside the picture.
@@ -138,7 +138,10 @@ pub(super) fn surfaces<F: Features>(
     let mut executor = Threads::new(workers, &mut scratch);
     let mut surfaces = vec![PixelLayers::default(); pixels];
     let search = FirstSurfaces::<F>::new(&setup.context(), SurfaceComponents::default());
-    let is_complete = search.layers(&wanted.objects, &mut surfaces, &mut executor)?;
+    let mut lines =
+        memory.take(RAYS, FirstSurfaces::<F>::layers_footprint(settings.width, settings.height))?;
+    let mut arena = Arena::over(&mut lines);
+    let is_complete = search.layers(&wanted.objects, &mut surfaces, &mut arena, &mut executor)?;
     memory.give_back(RAYS);
     Ok(if is_complete { surfaces } else { Vec::new() })
 }

@@ -96,9 +96,20 @@ impl<'i> ExrFile<'i> {
         let colours = [("B", 2), ("G", 1), ("R", 0)].map(|(name, at)| (name.to_owned(), channel(at)));
         let picture = Channels { list: colours.into(), width: size.x() };
         layers.list.sort_by(|(a, _), (b, _)| a.as_bytes().cmp(b.as_bytes()));
+        let mut of_image = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+        let mut of_part = LayerAttributes::default();
+        for (name, value) in attributes {
+            // These have fields of their own, and no other place.
+            match (name.as_str(), value) {
+                ("software", Attribute::Text(value)) => of_part.software_name = Some(text(&value)),
+                ("capDate", Attribute::Text(value)) => of_part.capture_date = Some(text(&value)),
+                ("utcOffset", Attribute::Number(value)) => of_part.utc_offset = Some(value),
+                (name, value) => drop(of_image.other.insert(text(name), value.into())),
+            }
+        }
         let part = |name: Option<&str>, channel_data| Layer {
             channel_data,
-            attributes: LayerAttributes { layer_name: name.map(Text::from), ..LayerAttributes::default() },
+            attributes: LayerAttributes { layer_name: name.map(Text::from), ..of_part.clone() },
             size,
             encoding: EXR,
         };
@@ -106,8 +117,6 @@ impl<'i> ExrFile<'i> {
             true => vec![part(None, picture)],
             false => vec![part(Some(PICTURE), picture), part(Some(LAYERS), layers)],
         };
-        let mut of_image = ImageAttributes::new(IntegerBounds::from_dimensions(size));
-        of_image.other.extend(attributes.into_iter().map(|(name, value)| (text(&name), value.into())));
         exr_bytes(&exr::image::Image { attributes: of_image, layer_data: exr::image::Layers::from(parts) })
     }
 }
