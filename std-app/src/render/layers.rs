@@ -8,7 +8,7 @@ use crate::load::LoadedScene;
 use crate::save::Image;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Footprint};
-use halflight_core::reconstruction::{FirstSurfaces, PixelLayers, SurfaceComponents};
+use halflight_core::reconstruction::{FirstSurfaces, PixelLayers, RANKS, SurfaceComponents};
 
 /// A layer beside the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +67,16 @@ impl Layer {
         Self::ALL.into_iter().find(|layer| layer.name() == name)
     }
 
+    /// Number of its channels in a file.
+    const fn channels(self) -> u32 {
+        match self {
+            Self::Albedo | Self::Normal | Self::Position | Self::Error => 3,
+            Self::Depth | Self::Samples => 1,
+            Self::Material | Self::Object => 1 + 2 * RANKS as u32,
+            Self::Halves => 6,
+        }
+    }
+
     /// True if the surfaces of the scene determine it, and no samples.
     pub const fn is_of_surfaces(self) -> bool {
         !matches!(self, Self::Error | Self::Samples | Self::Halves)
@@ -93,6 +103,11 @@ impl LayerSettings {
         let has_objects = layers.contains(&Layer::Object);
         let objects = if has_objects { loaded.triangle_objects.clone() } else { Vec::new() };
         Self { layers: layers.to_vec(), objects }
+    }
+
+    /// Number of their channels in a file.
+    pub(super) fn channels(&self) -> u32 {
+        self.layers.iter().map(|layer| layer.channels()).sum()
     }
 
     /// True if `layer` is wanted.

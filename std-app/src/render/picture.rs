@@ -37,14 +37,6 @@ const ESTIMATING: f64 = 1e-7;
 /// Seconds per pixel reserved for the choice of audited pixels and their first samples.
 const OPENING_AUDIT: f64 = 6e-7;
 
-/// Seconds per pixel reserved for the picture and its file.
-const WRITING: f64 = 2e-7;
-
-/// Seconds reserved for the end of a picture of so many pixels.
-pub(super) fn ending_seconds(pixels: usize) -> f64 {
-    WRITING * pixels as f64
-}
-
 /// A picture to be rendered.
 pub(super) struct Picture<'a, 'm, F> {
     pub(super) method: Method,
@@ -134,7 +126,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             report: None,
             estimating,
             estimated: 0.0,
-            ending: ending_seconds(pixels as usize),
+            ending: settings.ending_seconds(),
             kept: RewrittenFile::in_file(file),
             saved: Instant::now(),
             began: Instant::now(),

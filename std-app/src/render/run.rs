@@ -6,7 +6,7 @@ use super::files::{self, FilmHeader, FilmReader, Identity};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{self, Attempt, Ready};
-use super::picture::{self, Picture};
+use super::picture::Picture;
 use super::setup::RenderSetup;
 use super::threads::{Pool, Workers};
 use super::{
@@ -140,8 +140,7 @@ impl WithFeatures for Render<'_> {
         let (mut memory, mut film) = request.memory(built, &bank)?;
         let pixels = settings.width as usize * settings.height as usize;
         let mut clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
-        let left =
-            settings.stop.seconds.map(|limit| limit - clock.seconds() - picture::ending_seconds(pixels));
+        let left = settings.stop.seconds.map(|limit| limit - clock.seconds() - settings.ending_seconds());
         let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(left));
         let lights = built.lights.with_level(settings.level);
         let plain = RenderSetup { scene, bvh: built.bvh, lights, settings, workers: &workers };

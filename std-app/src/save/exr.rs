@@ -1,7 +1,8 @@
-//! OpenEXR files: a picture, layers beside it in a part of their own, and attributes.
+//! OpenEXR files: a picture, layers beside it, and attributes.
 //!
 //! The picture is the first part, alone: some readers refuse a first part with other channels than R, G, B and
-//! A. Attributes stand in the headers of all parts, because some readers look into the first alone.
+//! A. Each layer is a part of its own with the name of the layer, which its channels repeat: some readers put
+//! the name of a part before those of its channels, unless it stands there. Attributes stand in the headers of all parts, because some readers look into the first alone.
 
 use super::{FileError, Image};
 use crate::picture::{MAX_PIXELS, fail};
@@ -109,21 +110,28 @@ impl<'i> ExrFile<'i> {
         }
         let part = |name: Option<&str>, channel_data| Layer {
             channel_data,
-            attributes: LayerAttributes { layer_name: name.map(Text::from), ..of_part.clone() },
+            attributes: LayerAttributes { layer_name: name.map(text), ..of_part.clone() },
             size,
             encoding: EXR,
         };
-        let parts = match layers.list.is_empty() {
-            true => vec![part(None, picture)],
-            false => vec![part(Some(PICTURE), picture), part(Some(LAYERS), layers)],
-        };
+        let mut parts = vec![part((!layers.list.is_empty()).then_some(PICTURE), picture)];
+        while let Some((name, _)) = layers.list.first() {
+            let name = layer_of(name).to_owned();
+            let count = layers.list.iter().take_while(|(other, _)| layer_of(other) == name).count();
+            let list = layers.list.drain(..count).collect();
+            parts.push(part(Some(&name), Channels { list, width: size.x() }));
+        }
         exr_bytes(&exr::image::Image { attributes: of_image, layer_data: exr::image::Layers::from(parts) })
     }
 }
 
-/// Names of the parts of a file with layers.
+/// Name of the part of the picture in a file with layers.
 const PICTURE: &str = "beauty";
-const LAYERS: &str = "layers";
+
+/// Layer of a channel: its name up to the last dot.
+fn layer_of(channel: &str) -> &str {
+    channel.rsplit_once('.').map_or(channel, |(layer, _)| layer)
+}
 
 /// Text of OpenEXR, which is UTF-8.
 fn text(text: &str) -> Text {
