@@ -20,17 +20,25 @@ use std::sync::Arc;
 const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
 
 fn settings(renderer: &Renderer, [width, height]: [u32; 2], spp: u32) -> Settings {
-    let layers = Some(Arc::new(LayerSettings::new(renderer.scene(), &Layer::ALL)));
+    let layers = Some(Arc::new(LayerSettings::new(&Layer::ALL, &renderer.scene().triangle_objects)));
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let (method, reconstruct) = (Some(Method::Path), Reconstruct::Off);
     Settings { method, width, height, stop, reconstruct, layers, ..Settings::default() }
 }
 
+/// Arrays of a mesh.
+#[derive(Default)]
+struct Arrays {
+    positions: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
 /// Sphere of many triangles with smooth normals.
-fn sphere(middle: [f64; 3], radius: f64) -> (Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<[u32; 3]>) {
+fn sphere(middle: [f64; 3], radius: f64) -> Arrays {
     const ROWS: u32 = 400;
     const COLUMNS: u32 = 800;
-    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let Arrays { mut positions, mut normals, mut triangles } = Arrays::default();
     for row in 0..=ROWS {
         let (sin, cos) = (core::f64::consts::PI * f64::from(row) / f64::from(ROWS)).sin_cos();
         for column in 0..=COLUMNS {
@@ -44,7 +52,7 @@ fn sphere(middle: [f64; 3], radius: f64) -> (Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<[
             }
         }
     }
-    (positions, normals, triangles)
+    Arrays { positions, normals, triangles }
 }
 
 #[test]
@@ -54,7 +62,7 @@ fn depth_position_and_normal_are_those_of_a_sphere() {
     const TOLERANCE: f64 = 1e-4;
     const SIZE: [u32; 2] = [96, 64];
     let (middle, radius) = ([5.0, 1.0, -20.0], 3.0);
-    let (positions, normals, triangles) = sphere(middle, radius);
+    let Arrays { positions, normals, triangles } = sphere(middle, radius);
     let mut parts = SceneParts::default();
     let white = parts.material("white", Material::diffuse(Rgb::splat(0.25)));
     let mesh = PartMesh { positions: &positions, normals: &normals, triangles: &triangles, texcoords: &[] };
@@ -233,7 +241,8 @@ impl File {
 /// Two quads over a floor, as objects.
 const OBJECTS: &str = "mtllib scene.mtl\n\
     v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -1 2 -1\nv 1 2 -1\nv 1 2 1\nv -1 2 1\n\
-    v -0.6 0.5 0\nv -0.1 0.5 0\nv -0.1 1 0.1\nv -0.6 1 0.1\nv 0.1 0.5 0\nv 0.6 0.5 0\nv 0.6 1 0.1\nv 0.1 1 0.1\n\
+    v -0.6 0.5 0\nv -0.1 0.5 0\nv -0.1 1 0.1\nv -0.6 1 0.1\n\
+    v 0.1 0.5 0\nv 0.6 0.5 0\nv 0.6 1 0.1\nv 0.1 1 0.1\n\
     o Boden\nusemtl floor\nf 4 3 2 1\no lamp\nusemtl lamp\nf 5 6 7 8\n\
     o left «é»\nusemtl floor\nf 9 10 11 12\no right\nf 13 14 15 16\n";
 

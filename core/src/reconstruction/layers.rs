@@ -1,12 +1,12 @@
 //! Layers of a picture: the surfaces of each pixel, for compositing and for denoisers.
 //!
 //! Albedo and normal are those behind smooth mirrors and glass, as a denoiser needs them (Áfra, Open Image
-//! Denoise, 2019). Depth, position, material and object are those of the first surface. Rays pass cut-outs and
-//! panes by the probability of their transparency.
+//! Denoise, 2019). Depth, position, material and object are those of the first surface. Rays pass cut-outs
+//! and panes by the probability of their transparency.
 //!
 //! 1. The rays of the search of surfaces find the means of a pixel, so that films keep the same values.
-//! 2. Where rays of a pixel or its neighbours hit several materials or objects, more rays find the fractions of
-//!    both.
+//! 2. Where rays of a pixel or its neighbours hit several materials or objects, more rays find the
+//!    fractions of both.
 
 use super::chains::{Batch, Seen};
 use super::first_surfaces::{BAND, BATCH, EDGE_RAYS, FirstSurfaces, RAYS, edge_rays, mean, ranks};

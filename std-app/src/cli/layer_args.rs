@@ -63,7 +63,7 @@ impl LayerArgs {
     /// Settings of a render of `loaded`.
     pub(super) fn settings(&self, loaded: &LoadedScene) -> Option<Arc<LayerSettings>> {
         let layers = self.layers();
-        (!layers.is_empty()).then(|| Arc::new(LayerSettings::new(loaded, &layers)))
+        (!layers.is_empty()).then(|| Arc::new(LayerSettings::new(&layers, &loaded.triangle_objects)))
     }
 
     /// Adds the layers to a file.

@@ -82,8 +82,8 @@ fn add_layer_of_scene<'r>(
     }
 }
 
-/// Adds the number of the most frequent material or object, from 0, -1 for none, and an attribute with the list
-/// of all names.
+/// Adds the number of the most frequent material or object, from 0, -1 for none, and an attribute with the
+/// list of all names.
 fn add_numbers<'r>(
     file: &mut ExrFile<'r>,
     (layer, attribute): (&str, &str),

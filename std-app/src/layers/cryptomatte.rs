@@ -1,5 +1,6 @@
-//! Cryptomatte (Friedman and Jones, Psyop, 2015; specification 1.2.0): numbers of materials and objects by the
-//! hashes of their names, with the fractions of the pixel that they cover, two in each layer of four channels.
+//! Cryptomatte (Friedman and Jones, Psyop, 2015; specification 1.2.0): numbers of materials and objects by
+//! the hashes of their names, with the fractions of the pixel that they cover, two in each layer of four
+//! channels.
 
 use crate::save::{Attribute, ExrFile};
 use halflight_core::reconstruction::{Coverage, RANKS};

@@ -1,5 +1,5 @@
-//! Layers and attributes of OpenEXR files: surfaces, errors and samples of the pixels, Cryptomatte, and the facts
-//! of a render.
+//! Layers and attributes of OpenEXR files: surfaces, errors and samples of the pixels, Cryptomatte, and the
+//! facts of a render.
 //!
 //! ```no_run
 //! use halflight::layers::{LayerSource, add_layers};
@@ -8,7 +8,7 @@
 //! use std::sync::Arc;
 //!
 //! let renderer = halflight::Renderer::open("scenes/cornell/cornell.obj")?;
-//! let wanted = LayerSettings::new(renderer.scene(), &[Layer::Depth, Layer::Object]);
+//! let wanted = LayerSettings::new(&[Layer::Depth, Layer::Object], &renderer.scene().triangle_objects);
 //! let settings = Settings { layers: Some(Arc::new(wanted.clone())), ..Settings::default() };
 //! let result = renderer.render(&settings)?;
 //! let mut file = ExrFile::of(&result.image);

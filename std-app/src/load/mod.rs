@@ -59,7 +59,7 @@ use models::ReadModel;
 use mtl::MtlMaterial;
 use name::readings;
 use objects::Objects;
-use placed::{Placed, PlacedMesh, Placement};
+use placed::{PlacedMesh, Placement};
 use placed_light::PlacedLight;
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -328,14 +328,7 @@ impl SceneBuilder {
         self.budget.take(derived).map_err(|why| too_large(path, &why))?;
 
         let objects = Objects::of(&self.meshes, &self.objs);
-        let mut parts = Vec::new();
-        for (mesh, objects) in self.meshes.iter().zip(&objects.of_meshes) {
-            for group in &self.objs[mesh.obj].groups {
-                let material = mesh.materials[group.material.unwrap_or(mesh.materials.len() - 1)];
-                let texcoords = texcoords[material as usize];
-                parts.push(Placed { group, placement: mesh.placement, material, texcoords, objects });
-            }
-        }
+        let parts = placed::parts(&self.meshes, &self.objs, (&objects.of_meshes, &texcoords));
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
         let fit = fit::Fit::of(&parts);
         let pieces = geometry::pieces(&parts, &fit);

@@ -1,6 +1,6 @@
 //! Triangles of a file with their placement in the scene.
 
-use super::obj::Group;
+use super::obj::{Group, Obj};
 use super::texcoords::Texcoords;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -78,6 +78,23 @@ impl Placed<'_> {
             object
         })
     }
+}
+
+/// Triangles of all meshes. `objects`: those of each mesh; `texcoords`: those of each material.
+pub(super) fn parts<'a>(
+    meshes: &[PlacedMesh],
+    objs: &'a [Obj],
+    (objects, texcoords): (&'a [Vec<u32>], &[Texcoords]),
+) -> Vec<Placed<'a>> {
+    let mut parts = Vec::new();
+    for (mesh, objects) in meshes.iter().zip(objects) {
+        for group in &objs[mesh.obj].groups {
+            let material = mesh.materials[group.material.unwrap_or(mesh.materials.len() - 1)];
+            let texcoords = texcoords[material as usize];
+            parts.push(Placed { group, placement: mesh.placement, material, texcoords, objects });
+        }
+    }
+    parts
 }
 
 /// Bounding box of all finite vertices; infinite and inverted if there are none.

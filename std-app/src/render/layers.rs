@@ -4,7 +4,6 @@ use super::RenderError;
 use super::memory::Memory;
 use super::setup::RenderSetup;
 use super::threads::Threads;
-use crate::load::LoadedScene;
 use crate::save::Image;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Footprint};
@@ -98,11 +97,10 @@ pub struct LayerSettings {
 }
 
 impl LayerSettings {
-    /// These layers of `loaded`.
-    pub fn new(loaded: &LoadedScene, layers: &[Layer]) -> Self {
-        let has_objects = layers.contains(&Layer::Object);
-        let objects = if has_objects { loaded.triangle_objects.clone() } else { Vec::new() };
-        Self { layers: layers.to_vec(), objects }
+    /// These layers of a scene whose triangles belong to these `objects`.
+    pub fn new(layers: &[Layer], objects: &[u32]) -> Self {
+        let objects = if layers.contains(&Layer::Object) { objects } else { &[] };
+        Self { layers: layers.to_vec(), objects: objects.to_vec() }
     }
 
     /// Number of their channels in a file.

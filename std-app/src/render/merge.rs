@@ -117,8 +117,7 @@ pub fn merge_with(files: &[PathBuf], layers: &[Layer]) -> Result<Merged, RenderE
         };
         ErrorReport::judged_by(&state, reconstruction.as_mut(), judge, executor)
     });
-    let has_halves = wanted.has(Layer::Halves);
-    let pictures = || Pictures::of(&state.film, reconstruction.as_ref(), has_halves);
+    let pictures = || Pictures::of(&state.film, reconstruction.as_ref(), wanted.has(Layer::Halves));
     let Pictures { image, variance, samples, layers: mut made } = Workers::new(&pool).install(pictures);
     if [Layer::Albedo, Layer::Normal].iter().any(|layer| wanted.has(*layer)) {
         let of_film = |surfaces: &PixelSurfaces| {

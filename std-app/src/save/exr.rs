@@ -1,8 +1,9 @@
 //! OpenEXR files: a picture, layers beside it, and attributes.
 //!
-//! The picture is the first part, alone: some readers refuse a first part with other channels than R, G, B and
-//! A. Each layer is a part of its own with the name of the layer, which its channels repeat: some readers put
-//! the name of a part before those of its channels, unless it stands there. Attributes stand in the headers of all parts, because some readers look into the first alone.
+//! The picture is the first part, alone: some readers refuse a first part with other channels than R, G, B
+//! and A. Each layer is a part of its own with the name of the layer, which its channels repeat: some readers
+//! put the name of a part before those of its channels, unless it stands there. Attributes stand in the
+//! headers of all parts, because some readers look into the first alone.
 
 use super::{FileError, Image};
 use crate::picture::{MAX_PIXELS, fail};
