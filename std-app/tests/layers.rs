@@ -112,7 +112,8 @@ fn objects_and_materials_are_those_of_single_rays() {
     std::fs::write(folder.path("objects.obj"), OBJECTS).unwrap();
     let renderer = Renderer::open(folder.path("objects.obj")).unwrap();
     let loaded = renderer.scene();
-    let view = View { eye: [0.0, 1.0, 3.0], look_at: [0.0, 0.8, 0.0], up: [0.0, 1.0, 0.0] };
+    // The floor is behind the lower edges of the quads, and nothing behind the upper ones.
+    let view = View { eye: [0.1, 1.95, 2.2], look_at: [0.0, 0.4, 0.0], up: [0.0, 1.0, 0.0] };
     let camera = renderer.camera(view, 50.0).unwrap();
     let (settings, never) = (settings(&renderer, SIZE, 1), AtomicBool::new(false));
     let result = renderer.render_with(camera, &settings, &mut |_| {}, &never).unwrap();
@@ -120,7 +121,7 @@ fn objects_and_materials_are_those_of_single_rays() {
     let mut lines = vec![Line::ZERO; 1 << 16];
     let bvh = Bvh::build(&mesh, &mut Arena::over(&mut lines)).unwrap();
     let level = Level::detect();
-    let mut mixed = 0;
+    let [mut mixed, mut partial] = [0; 2];
     for (at, pixel) in result.layers.surfaces.iter().enumerate() {
         let [mut objects, mut materials] = [BTreeMap::new(), BTreeMap::new()];
         for ray in 0..GRID * GRID {
@@ -133,10 +134,12 @@ fn objects_and_materials_are_those_of_single_rays() {
             }
         }
         mixed += u32::from(objects.len() > 1);
+        let hits: u32 = objects.values().sum();
+        partial += u32::from(hits > 0 && hits < GRID * GRID);
         let all = (GRID * GRID) as f32;
         for (expected, found) in [(&objects, &pixel.objects), (&materials, &pixel.materials)] {
             let sum: f32 = found.iter().map(|one| one.fraction).sum();
-            let hits: i32 = expected.values().sum();
+            let hits: u32 = expected.values().sum();
             assert!((sum - hits as f32 / all).abs() < TOLERANCE, "{at}: {expected:?} {found:?}");
             for (id, count) in expected.iter() {
                 let error = (fraction_of(found, *id) - *count as f32 / all).abs();
@@ -145,7 +148,7 @@ fn objects_and_materials_are_those_of_single_rays() {
             assert!(found.windows(2).all(|pair| pair[0].fraction >= pair[1].fraction), "{found:?}");
         }
     }
-    assert!(mixed > 30, "{mixed} pixels at edges");
+    assert!(mixed > 10 && partial > 10, "{mixed} and {partial} pixels at edges");
 }
 
 #[test]
