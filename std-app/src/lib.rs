@@ -53,6 +53,7 @@ mod cgroup;
 pub mod compare;
 mod error;
 mod file_error;
+pub mod layers;
 pub mod load;
 pub mod memory;
 pub mod pages;

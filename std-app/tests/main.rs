@@ -7,6 +7,7 @@ mod caustics;
 mod cli;
 mod compare;
 mod fair_schedule;
+mod layers;
 mod lightmaps;
 mod live;
 mod loading;

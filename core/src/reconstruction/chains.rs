@@ -57,6 +57,8 @@ pub(super) struct Seen {
     mirrored: u32,
     /// Triangle at the origin of the ray.
     triangle: u32,
+    /// Triangle of the first surface; [`MISS`] if the ray escapes.
+    pub first: u32,
 }
 
 impl Seen {
@@ -132,7 +134,7 @@ impl<'a, F: Features> Chains<'a, F> {
         let Batch { rays, hits, seen, reflected } = batch;
         let count = count.min(rays.len());
         seen.iter_mut().take(count).for_each(|seen| {
-            *seen = Seen { triangle: MISS, end: ENVIRONMENT, ..Seen::default() };
+            *seen = Seen { triangle: MISS, first: MISS, end: ENVIRONMENT, ..Seen::default() };
         });
         let mut flat = Flat { triangle: MISS, ..Flat::default() };
         let (mut live, mut traced) = (count, 0);
@@ -187,6 +189,7 @@ impl<'a, F: Features> Chains<'a, F> {
         let Some(material) = self.material(hit) else { return self.escape(seen) };
         if seen.specular == 0 {
             seen.depth += hit.t;
+            seen.first = hit.triangle;
         }
         let ends_here = !material.has_cutout() && !material.surface.may_be_smooth();
         if ends_here && hit.triangle != seen.triangle && hit.t > self.near {
@@ -242,7 +245,7 @@ impl<'a, F: Features> Chains<'a, F> {
 
     fn escape(&self, seen: &mut Seen) -> Step {
         if seen.specular == 0 {
-            seen.depth = 0.0;
+            (seen.depth, seen.first) = (0.0, MISS);
         }
         (seen.end, seen.albedo, seen.normal) = (ENVIRONMENT, [1.0; 3], [0.0; 3]);
         Step::End

@@ -28,7 +28,7 @@ const PLANE_NORMAL: f32 = 1e-3;
 const NONE: u32 = u32::MAX;
 
 /// Component of each triangle: the lowest index of its triangles. Each instance has components of its own.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SurfaceComponents<'m> {
     /// Components of the triangles in world space, then those of the prototypes, by index in their meshes.
     components: &'m [u32],

@@ -21,15 +21,15 @@ use glam::Vec3;
 use halflight_simd::kernels::shade::numbers::SampleBlock;
 
 /// Rays of each pixel. A power of four, so that their positions form a net.
-const RAYS: usize = 16;
+pub(super) const RAYS: usize = 16;
 /// Largest and smallest number of rays of a pixel with an edge nearby.
-const EDGE_RAYS: [usize; 2] = [256, 64];
+pub(super) const EDGE_RAYS: [usize; 2] = [256, 64];
 /// Segments of rays of edges per pixel of the picture. More pixels with edges have fewer rays each.
 const EDGE_BUDGET: f64 = 48.0;
 /// Rays that are traced together.
-const BATCH: usize = 1024;
+pub(super) const BATCH: usize = 1024;
 /// Rows of a task.
-const BAND: usize = 4;
+pub(super) const BAND: usize = 4;
 /// Fraction of the cluster of a pixel beside the rim of a lamp.
 const BESIDE_LAMP: f32 = 0.9999;
 
@@ -41,9 +41,9 @@ const LENS: u32 = 1;
 
 /// Search for the first surfaces of a view.
 pub struct FirstSurfaces<'a, F> {
-    chains: Chains<'a, F>,
-    camera: Camera,
-    size: [u32; 2],
+    pub(super) chains: Chains<'a, F>,
+    pub(super) camera: Camera,
+    pub(super) size: [u32; 2],
     seed: u32,
 }
 
@@ -132,7 +132,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 
     /// True if rays of a pixel or its neighbours disagree.
-    fn is_at_edge(&self, clusters: &[u32], i: usize) -> bool {
+    pub(super) fn is_at_edge(&self, clusters: &[u32], i: usize) -> bool {
         let cluster = clusters.get(i).copied().unwrap_or(NO_CLUSTER);
         cluster == NO_CLUSTER || self.neighbourhood(i).any(|other| clusters.get(other) != Some(&cluster))
     }
@@ -199,7 +199,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 
     /// Traces the first `rays` camera rays of `count` pixels, with the indices `index` in the picture.
-    fn trace(
+    pub(super) fn trace(
         &self,
         batch: &mut Batch,
         count: usize,
@@ -218,7 +218,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 
     /// Camera rays with these pixels and sample indices.
-    fn aim(&self, rays: &mut [Ray], number: impl Fn(usize) -> (u32, u32)) {
+    pub(super) fn aim(&self, rays: &mut [Ray], number: impl Fn(usize) -> (u32, u32)) {
         const BLOCK: usize = 16;
         let ([width, height], level) = (self.size, self.chains.context.level);
         let mut samples = SampleBlock::EMPTY;
@@ -253,7 +253,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
 
 /// Number of rays of each pixel at an edge in a picture of so many `pixels`. A ray of each of these takes
 /// `segments` in all.
-fn edge_rays(pixels: f64, segments: f64) -> usize {
+pub(super) fn edge_rays(pixels: f64, segments: f64) -> usize {
     let [most, least] = EDGE_RAYS;
     let mut rays = most;
     while rays > least && rays as f64 * segments > pixels * EDGE_BUDGET {
@@ -263,7 +263,7 @@ fn edge_rays(pixels: f64, segments: f64) -> usize {
 }
 
 /// A whole pixel of the first ray's cluster with the means of all.
-fn mean(seen: &[Seen]) -> PixelSurfaces {
+pub(super) fn mean(seen: &[Seen]) -> PixelSurfaces {
     let (mut albedo, mut normal, mut depth, mut hits) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
     for seen in seen {
         albedo += Vec3::from(seen.albedo);
@@ -288,10 +288,18 @@ fn tally(seen: &[Seen], numbers: &mut [u32], pixel: &mut PixelSurfaces) {
     let count = seen.len().min(numbers.len());
     let Some(numbers) = numbers.get_mut(..count) else { return };
     numbers.iter_mut().zip(seen).for_each(|(number, seen)| *number = seen.cluster());
+    let best = ranks::<SLOTS>(numbers);
+    pixel.clusters = best.map(|(_, number)| number);
+    pixel.fractions = best.map(|(rays, _)| rays as f32 / count.max(1) as f32);
+}
+
+/// Most frequent numbers and how often they occur, most frequent first, the lower number first among equals.
+/// Slots without a number have none. Sorts `numbers`.
+pub(super) fn ranks<const N: usize>(numbers: &mut [u32]) -> [(usize, u32); N] {
     numbers.sort_unstable();
-    let mut best = [(0usize, NO_CLUSTER); SLOTS];
+    let mut best = [(0usize, NO_CLUSTER); N];
     for run in numbers.chunk_by(|a, b| a == b) {
-        // Insertion, with the lower number first among equals.
+        // Insertion: a later number is behind those as frequent.
         let mut entry = (run.len(), run.first().copied().unwrap_or(NO_CLUSTER));
         for slot in &mut best {
             if entry.0 > slot.0 {
@@ -299,6 +307,5 @@ fn tally(seen: &[Seen], numbers: &mut [u32], pixel: &mut PixelSurfaces) {
             }
         }
     }
-    pixel.clusters = best.map(|(_, number)| number);
-    pixel.fractions = best.map(|(rays, _)| rays as f32 / count.max(1) as f32);
+    best
 }

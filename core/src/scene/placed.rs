@@ -28,6 +28,15 @@ impl<'a> Instances<'a> {
 }
 
 impl<'a> Mesh<'a> {
+    /// Position of triangle `index` in a list of all triangles in world space and then all instances.
+    pub(crate) fn index_among_objects(&self, index: u32) -> usize {
+        let placed = self.instances.placed;
+        match placed.partition_point(|instance| instance.first <= index).checked_sub(1) {
+            Some(number) => self.triangles.len() + number,
+            None => index as usize,
+        }
+    }
+
     /// Instance of triangle `index`, its prototype, and its index there. `None` for triangles in world space.
     #[inline]
     pub(crate) fn instance_of(&self, index: u32) -> Option<(&'a Instance, Mesh<'a>, u32)> {

@@ -10,6 +10,7 @@ mod compare;
 mod failure;
 mod info;
 mod interrupt;
+mod layer_args;
 mod live_args;
 mod manual;
 mod merge;

@@ -2,13 +2,16 @@
 
 use super::bake::tables;
 use super::failure::Failure;
-use super::outputs::{Outputs, Role};
+use super::layer_args::LayerArgs;
+use super::outputs::{Outputs, Picture, Role};
 use super::view_args::ViewArgs;
 use super::{summary, values};
 use clap::Args;
 use halflight::bake::{self, MergedBake};
+use halflight::layers::{Facts, LayerSource};
 use halflight::render::{self, Merged};
-use halflight::report::{dropped_object, error_object, file_name, findings_object};
+use halflight::report::{Provenance, dropped_object, error_object, file_name, findings_object};
+use halflight::save::ExrFile;
 use halflight::values::TargetError;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -32,6 +35,8 @@ pub(super) struct Merge {
     /// Add the samples per pixel that relMSE needs to fall to this value, of pictures of the same settings
     #[arg(long, value_name = "RELMSE", value_parser = values::checked::<f64, TargetError>)]
     for_error: Option<TargetError>,
+    #[command(flatten)]
+    layers: LayerArgs,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
@@ -45,9 +50,21 @@ impl Merge {
         let mut outputs = Outputs::new(self.json);
         self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
         self.films.iter().try_for_each(|film| outputs.protect(film))?;
-        let merged = render::merge(&self.films)?;
+        self.layers.check(&self.output)?;
+        let merged = render::merge_with(&self.films, &self.layers.of_films()?)?;
         let shown = self.view.shown(&merged.image, &self.output);
-        let saved = outputs.save_to(&self.output, &merged.image, &shown);
+        let provenance = Provenance::here();
+        let Merged { variance, samples, layers, .. } = &merged;
+        let layers = LayerSource { variance, samples, layers, scene: None };
+        self.layers.note_missing(&layers);
+        let exr = || {
+            let mut file = ExrFile::of(&merged.image);
+            Facts::of_merged(&merged, &provenance).add_to(&mut file);
+            self.layers.add_to(&mut file, &layers);
+            file
+        };
+        let picture = Picture { image: &merged.image, shown: &shown, exr: &exr };
+        let saved = outputs.save_to(&self.output, &picture);
         let results =
             if self.json { self.object(&merged, &saved).to_string() } else { self.text(&merged, &saved) };
         Ok(outputs.end(&results, ExitCode::SUCCESS))

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::interrupt::INTERRUPT;
 use super::stdio::{print_message, print_result};
 use halflight::report::{self, Files};
-use halflight::save::{self, Destination, Format, Identity, Image, Patience};
+use halflight::save::{self, Destination, ExrFile, Format, Identity, Image, Patience};
 use std::io::{self, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -63,6 +63,15 @@ struct Output {
     role: Role,
     path: PathBuf,
     identity: Identity,
+}
+
+/// A picture for files of all formats.
+pub(super) struct Picture<'i> {
+    pub(super) image: &'i Image,
+    /// As PNG files show it.
+    pub(super) shown: &'i Image,
+    /// The OpenEXR file, with layers and attributes.
+    pub(super) exr: &'i dyn Fn() -> ExrFile<'i>,
 }
 
 /// Output files of a command.
@@ -161,23 +170,23 @@ impl Outputs {
 
     /// Writes a picture to all of `paths`, PNG files as they are `shown`, to files before pipes, whose
     /// readers may be slow; returns those written.
-    pub(super) fn save_to<'p>(
-        &mut self,
-        paths: &'p [PathBuf],
-        image: &Image,
-        shown: &Image,
-    ) -> Vec<&'p PathBuf> {
-        let of = |path: &Path| match Format::of(path).is_ok_and(Format::is_linear) {
-            true => image,
-            false => shown,
-        };
+    pub(super) fn save_to<'p>(&mut self, paths: &'p [PathBuf], picture: &Picture) -> Vec<&'p PathBuf> {
         let is_stream =
             |path: &PathBuf| Destination::of(path).is_ok_and(|destination| destination.is_stream());
         let mut order: Vec<usize> = (0..paths.len()).collect();
         order.sort_by_key(|&i| is_stream(&paths[i]));
-        order.retain(|&i| self.save(&paths[i], of(&paths[i])));
+        order.retain(|&i| match Format::of(&paths[i]) {
+            Ok(Format::Exr) => self.save_exr(&paths[i], (picture.exr)()),
+            Ok(Format::Png) => self.save(&paths[i], picture.shown),
+            _ => self.save(&paths[i], picture.image),
+        });
         order.sort_unstable();
         order.into_iter().map(|i| &paths[i]).collect()
+    }
+
+    fn save_exr(&mut self, path: &Path, file: ExrFile) -> bool {
+        let saved = save::write_exr(path, file, self.patience());
+        saved.map_err(|error| self.fail(error)).is_ok()
     }
 
     /// Writes a table.

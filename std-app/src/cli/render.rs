@@ -3,17 +3,20 @@
 use super::checkpoint_args::CheckpointArgs;
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
+use super::layer_args::LayerArgs;
 use super::live_args::LiveArgs;
-use super::outputs::{Outputs, Role};
+use super::outputs::{Outputs, Picture, Role};
 use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, note_darkness, render_failure};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::view_args::ViewArgs;
 use super::{print_note, stdio, summary, values};
 use clap::Args;
 use halflight::compare::compare;
+use halflight::layers::{Facts, LayerSource};
 use halflight::load::{self, LoadedScene};
 use halflight::render::{self, Ending, Progress, Settings, Shard, Stop};
 use halflight::report::{Provenance, Run};
+use halflight::save::ExrFile;
 use halflight::values::{Samples, TargetError};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -44,6 +47,8 @@ pub(super) struct Render {
     live: LiveArgs,
     #[command(flatten)]
     progress: ProgressArgs,
+    #[command(flatten)]
+    layers: LayerArgs,
 
     /// Samples per pixel. Without --spp, --time and --error a render ends at relMSE 1e-3 or after 60 s; a
     /// shard has 256 samples
@@ -91,6 +96,7 @@ impl Render {
         self.progress.apply();
         let start = Instant::now();
         let (role, pictures) = self.pictures();
+        self.layers.check(&pictures)?;
         let mut outputs = self.outputs(role, &pictures)?;
         let reference = self.picture.reference()?;
 
@@ -113,6 +119,7 @@ impl Render {
             resume: self.checkpoint.resume(),
             load_cache: self.load_cache.clone(),
             save_cache: self.save_cache.clone(),
+            layers: self.layers.settings(&loaded),
             survey: self.report.is_some().then_some(SURVEY_POINTS),
             photon_view: self.report.is_some(),
             ..settings
@@ -131,12 +138,22 @@ impl Render {
         result.unsaved.iter().for_each(|error| outputs.fail(error.clone()));
         live.put(&result.image);
         let shown = self.view.shown(&result.image, &pictures);
-        let saved: Vec<_> = outputs.save_to(&pictures, &result.image, &shown).into_iter().cloned().collect();
+        let (name, provenance) = (file_name(&self.scene), Provenance::here());
+        let layers = LayerSource::new(&result, &loaded);
+        self.layers.note_missing(&layers);
+        let exr = || {
+            let mut file = ExrFile::of(&result.image);
+            Facts::of_render(&result, (&name, &settings), &provenance).add_to(&mut file);
+            self.layers.add_to(&mut file, &layers);
+            file
+        };
+        let picture = Picture { image: &result.image, shown: &shown, exr: &exr };
+        let saved: Vec<_> = outputs.save_to(&pictures, &picture).into_iter().cloned().collect();
         let comparison =
             settings.reference.as_ref().map(|reference| compare(&result.image, reference)).transpose()?;
         let run = Run {
             scene: &scene,
-            name: &file_name(&self.scene),
+            name: &name,
             repairs: &loaded.repairs,
             settings: &settings,
             result: &result,
@@ -144,7 +161,7 @@ impl Render {
             outputs: &saved,
             load_seconds,
             total_seconds: start.elapsed().as_secs_f64(),
-            provenance: &Provenance::here(),
+            provenance: &provenance,
         };
         let reported = self.report.as_deref().filter(|folder| outputs.save_report(folder, &run.files()));
         let results = match self.json {

@@ -5,8 +5,8 @@ use super::instances::{self, Palette, Shared};
 use super::memory_estimate::of_scene;
 use super::mtl::MtlMaterial;
 use super::notes::Notes;
+use super::objects::{self, Objects};
 use super::overlaps::Pair;
-use super::placed::PlacedMesh;
 use super::scene::{LoadedScene, RenderSettings};
 use super::scene_file::EnvironmentChange;
 use super::texcoords::Texcoords;
@@ -14,22 +14,10 @@ use super::{LoadError, LoadOptions, SceneBuilder, count_vertices, too_large};
 use super::{
     duplicate_emitters, fit, geometry, memory_estimate, open_glass, overlaps, surface, touching_glass,
 };
-use core::ops::Range;
 use halflight_core::scene::{Environment, Material};
 use std::path::Path;
 
 impl SceneBuilder {
-    /// Names and vertices of the meshes that are no instances, whose parts have these ends.
-    fn meshes(&self, ends: &[u32], shared: &Shared) -> Vec<(String, Range<u32>)> {
-        let (mut parts, mut first) = (0, 0);
-        let range = |(_, mesh): (usize, &PlacedMesh)| {
-            parts += self.objs[mesh.obj].groups.len();
-            let end = ends[..parts].last().copied().unwrap_or_default();
-            (mesh.name.clone(), core::mem::replace(&mut first, end)..end)
-        };
-        self.meshes.iter().enumerate().filter(|(number, _)| !shared.has(*number)).map(range).collect()
-    }
-
     /// The scene with the buffers of the core.
     pub(super) fn build(
         mut self,
@@ -66,7 +54,8 @@ impl SceneBuilder {
             false => Shared::of(&self.meshes, &self.objs, &materials, notes),
         };
         // Instances extend the scene as copies do.
-        let (mut parts, in_world) = shared.placed(&self.meshes, &self.objs, &texcoords);
+        let objects = Objects::of(&self.meshes, &self.objs, &shared);
+        let (mut parts, in_world) = shared.placed(&self.meshes, &self.objs, (&objects.of_meshes, &texcoords));
         let fit = fit::Fit::of(&parts);
         parts.truncate(in_world);
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
@@ -87,6 +76,8 @@ impl SceneBuilder {
             .place(&shared, &self.meshes, &fit.transform, geometry.triangles.len())
             .map_err(|count| too_many_triangles(path, count))?;
         let lights = self.lights.iter().filter_map(|light| light.in_core(&fit.transform, notes)).collect();
+        let mut triangle_objects = geometry.objects;
+        triangle_objects.extend(objects.of_instances);
         let loaded = LoadedScene {
             positions: geometry.positions,
             normals: geometry.normals,
@@ -96,7 +87,9 @@ impl SceneBuilder {
             materials,
             material_names: names,
             instances,
-            meshes: self.meshes(&geometry.ends, &shared),
+            meshes: objects::meshes(&self.meshes, &self.objs, (&geometry.ends, &shared)),
+            object_names: objects.names,
+            triangle_objects,
             textures,
             lights,
             environment,

@@ -118,14 +118,14 @@ impl Shared {
         &self,
         meshes: &[PlacedMesh],
         objs: &'a [Obj],
-        texcoords: &[Texcoords],
+        (objects, texcoords): (&'a [Vec<u32>], &[Texcoords]),
     ) -> (Vec<Placed<'a>>, usize) {
         let (mut parts, mut placed) = (Vec::new(), Vec::new());
-        for (mesh, prototype) in meshes.iter().zip(&self.of_mesh) {
+        for ((mesh, prototype), objects) in meshes.iter().zip(&self.of_mesh).zip(objects) {
             for group in &objs[mesh.obj].groups {
                 let material = mesh.material_of(group);
                 let texcoords = texcoords[material as usize];
-                let part = Placed { group, placement: mesh.placement, material, texcoords };
+                let part = Placed { group, placement: mesh.placement, material, texcoords, objects };
                 if prototype.is_some() { placed.push(part) } else { parts.push(part) }
             }
         }
@@ -146,7 +146,8 @@ impl Shared {
             let part = |group| {
                 let material = mesh.material_of(group);
                 let texcoords = texcoords[material as usize];
-                Placed { group, placement: Placement::IDENTITY, material, texcoords }
+                let objects = &[];
+                Placed { group, placement: Placement::IDENTITY, material, texcoords, objects }
             };
             objs[mesh.obj].groups.iter().map(part).collect()
         };

@@ -26,6 +26,7 @@ pub mod mtl;
 mod name;
 mod notes;
 pub mod obj;
+mod objects;
 mod open_glass;
 mod overlaps;
 mod parts;

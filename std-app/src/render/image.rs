@@ -1,9 +1,10 @@
 //! Images of a film.
 
+use super::Layers;
 use super::gaps::{self, Sketch};
 use super::threads::Workers;
 use crate::save::Image;
-use halflight_core::film::{Film, Pixel};
+use halflight_core::film::{Film, Half, Pixel};
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::reconstruction::FilmReconstruction;
 use rayon::prelude::*;
@@ -29,6 +30,32 @@ pub(super) fn without_gaps(
     }
     gaps::fill(&mut image, &known);
     (image, gaps)
+}
+
+/// Pictures of a film at the end of a render.
+pub(super) struct Pictures {
+    pub(super) image: Image,
+    pub(super) variance: Image,
+    /// Samples of each pixel, row by row.
+    pub(super) samples: Vec<u32>,
+    /// Layers of samples.
+    pub(super) layers: Layers,
+}
+
+impl Pictures {
+    /// Pictures of `film` and its reconstruction, and its halves if `with_halves`.
+    pub(super) fn of(film: &Film, made: Option<&FilmReconstruction>, with_halves: bool) -> Self {
+        let half = |of: fn(&Pixel) -> &Half| {
+            of_size(film, by_rows(film, |pixel| of(&pixel).mean().to_array()).collect())
+        };
+        let halves = with_halves.then(|| [half(|pixel| &pixel.even), half(|pixel| &pixel.odd)]);
+        Self {
+            image: image(film, made),
+            variance: variance(film, made),
+            samples: by_rows(film, |pixel| pixel.count()).collect(),
+            layers: Layers { halves, ..Layers::default() },
+        }
+    }
 }
 
 /// Picture of a film, or its reconstruction if there is one.

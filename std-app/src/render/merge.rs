@@ -2,7 +2,8 @@
 
 use super::error::RenderError;
 use super::files::{FilmHeader, FilmReader};
-use super::image::image;
+use super::image::Pictures;
+use super::layers::{self, Layer, LayerSettings, Layers};
 use super::merge_points::check_complete;
 use super::rejected_tiles::{self, RejectedTile, empty_pixels};
 use super::threads::{Pool, Threads, Workers};
@@ -13,7 +14,7 @@ use halflight_core::audit::{AuditedPixels, ErrorReport};
 use halflight_core::findings::Findings;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::method::{RenderState, Shard};
-use halflight_core::reconstruction::{FilmReconstruction, PixelSurfaces};
+use halflight_core::reconstruction::{FilmReconstruction, PixelLayers, PixelSurfaces};
 use halflight_core::transport::Counters;
 use std::path::PathBuf;
 
@@ -22,6 +23,12 @@ use std::path::PathBuf;
 pub struct Merged {
     /// The picture.
     pub image: Image,
+    /// Estimated variance of each pixel and channel of the picture.
+    pub variance: Image,
+    /// Samples of each pixel, row by row.
+    pub samples: Vec<u32>,
+    /// Layers of samples and, if all films have them, albedo and normal of surfaces.
+    pub layers: Layers,
     /// Samples per pixel.
     pub spp: u32,
     /// Seconds of rendering, summed over all shards.
@@ -49,6 +56,14 @@ pub struct Merged {
 /// # Errors
 /// Names the first file that does not belong to the first one and why, or missing and repeated shards.
 pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
+    merge_with(files, &[])
+}
+
+/// As [`merge`], with these layers. Those that need the scene have no values.
+///
+/// # Errors
+/// As [`merge`].
+pub fn merge_with(files: &[PathBuf], layers: &[Layer]) -> Result<Merged, RenderError> {
     let most = Budget::new(None).limit();
     let films = files.iter().map(|file| FilmReader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
     let (Some(first), Some(name)) = (films.first(), files.first()) else { return Err(RenderError::Shard) };
@@ -64,9 +79,11 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         let surfaces = Footprint::default().slice::<PixelSurfaces>(width as usize * height as usize);
         footprint = footprint.and(surfaces).and(FilmReconstruction::footprint([width, height]));
     }
-    // The picture, and the data of its error estimate.
-    let beside = 64 * width as usize * height as usize;
-    let needed = footprint.bytes().saturating_add(beside);
+    // The picture, its variance and samples, and the data of its error estimate.
+    let pixels = width as usize * height as usize;
+    let wanted = LayerSettings { layers: layers.to_vec(), objects: Vec::new() };
+    let of_layers = layers::footprint(&wanted, pixels).bytes();
+    let needed = footprint.bytes().saturating_add(80 * pixels).saturating_add(of_layers);
     if needed > most {
         return Err(RenderError::Memory { needed, available: most });
     }
@@ -100,8 +117,20 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         };
         ErrorReport::judged_by(&state, reconstruction.as_mut(), judge, executor)
     });
+    let pictures = || Pictures::of(&state.film, reconstruction.as_ref(), wanted.has(Layer::Halves));
+    let Pictures { image, variance, samples, layers: mut made } = Workers::new(&pool).install(pictures);
+    if [Layer::Albedo, Layer::Normal].iter().any(|layer| wanted.has(*layer)) {
+        let of_film = |surfaces: &PixelSurfaces| {
+            let PixelSurfaces { albedo, normal, .. } = *surfaces;
+            PixelLayers { albedo, normal, ..PixelLayers::default() }
+        };
+        made.surfaces = surfaces.iter().map(of_film).collect();
+    }
     Ok(Merged {
-        image: image(&state.film, reconstruction.as_ref()),
+        image,
+        variance,
+        samples,
+        layers: made,
         spp,
         seconds,
         counters: state.counters,

@@ -18,6 +18,7 @@ mod held_out;
 mod hidden_light;
 mod history;
 mod image;
+mod layers;
 mod memory;
 mod merge;
 mod merge_points;
@@ -47,9 +48,10 @@ pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use halflight_core::method::{CacheOptions as CacheSettings, MethodKind as Method, PhotonSettings};
 pub use halflight_core::renderer::{Reconstruct, Stop, StopRule};
 pub use history::{Against, Round};
+pub use layers::{Layer, LayerSettings, Layers};
 pub use memory::MemoryUse;
 pub(crate) use memory::scene_bytes;
-pub use merge::{Merged, merge};
+pub use merge::{Merged, merge, merge_with};
 pub(crate) use merge_points::merge_points;
 pub use method::{MapView, PhotonView};
 pub(crate) use points::with_points;
@@ -119,6 +121,8 @@ pub struct Settings {
     pub audit: Option<f64>,
     /// Reconstruction of the picture from the halves of its film. The film file keeps the samples.
     pub reconstruct: Reconstruct,
+    /// Layers beside the picture; `None`: none.
+    pub layers: Option<Arc<LayerSettings>>,
     /// Part of the picture to render.
     pub shard: Shard,
     /// Film file to write during the render.
@@ -176,6 +180,7 @@ impl Default for Settings {
             reference: None,
             audit: None,
             reconstruct: Reconstruct::Auto,
+            layers: None,
             shard: Shard::WHOLE,
             checkpoint: None,
             resume: None,
@@ -257,6 +262,8 @@ pub struct RenderResult {
     pub variance: Image,
     /// Samples of each pixel, row by row.
     pub samples: Vec<u32>,
+    /// Layers, if the settings ask for some.
+    pub layers: Layers,
     /// Threads used.
     pub threads: usize,
     /// Times of the phases.

@@ -4,14 +4,14 @@ use super::audit::ThreadedAudit;
 use super::files::{self, FilmHeader, FilmReader, Identity, RewrittenFile};
 use super::gaps::Sketch;
 use super::history::{Clock, Reference, Round};
-use super::image::{by_rows, image, variance, without_gaps};
+use super::image::{Pictures, image, without_gaps};
 use super::memory::Memory;
 use super::method::Renderer;
 use super::rejected_tiles::{self, empty_pixels};
 use super::setup::RenderSetup;
 use super::survey::Survey;
 use super::threads::{RoundLimits, ThreadedRound, Threads};
-use super::{Ending, ErrorEstimate, Method, Progress, RenderError, RenderResult, Seconds};
+use super::{Ending, ErrorEstimate, Layer, Method, Progress, RenderError, RenderResult, Seconds};
 use crate::save::Patience;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -22,7 +22,6 @@ use halflight_core::method::hidden_light::HiddenLight;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::reconstruction::FilmReconstruction;
 use halflight_core::renderer::{OutOfReach, Plan, Rounds};
-use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
 
@@ -37,14 +36,6 @@ const ESTIMATING: f64 = 1e-7;
 
 /// Seconds per pixel reserved for the choice of audited pixels and their first samples.
 const OPENING_AUDIT: f64 = 6e-7;
-
-/// Seconds per pixel reserved for the picture and its file.
-const WRITING: f64 = 2e-7;
-
-/// Seconds reserved for the end of a picture of so many pixels.
-pub(super) fn ending_seconds(pixels: usize) -> f64 {
-    WRITING * pixels as f64
-}
 
 /// A picture to be rendered.
 pub(super) struct Picture<'a, 'm, F> {
@@ -135,7 +126,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             report: None,
             estimating,
             estimated: 0.0,
-            ending: ending_seconds(pixels as usize),
+            ending: settings.ending_seconds(),
             kept: RewrittenFile::in_file(file),
             saved: Instant::now(),
             began: Instant::now(),
@@ -335,9 +326,9 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         }
         let film = &state.film;
         let made = reconstruction.as_ref();
-        let pictures = || (image(film, made), variance(film, made));
-        let (image, variance) = workers.install(pictures);
-        let samples: Vec<u32> = workers.install(|| by_rows(film, |pixel| pixel.count()).collect());
+        let halves = settings.layers.as_ref().is_some_and(|layers| layers.has(Layer::Halves));
+        let Pictures { image, variance, samples, layers } =
+            workers.install(|| Pictures::of(film, made, halves));
         let (image, filled_pixels) = without_gaps(image, &samples, (state, sketch, workers));
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
@@ -355,6 +346,7 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
             history: self.history,
             variance,
             samples,
+            layers,
             threads: workers.count(),
             seconds: Seconds { build: 0.0, render, estimate: self.estimated },
             counters: state.counters,

@@ -6,12 +6,12 @@ use super::files::{self, FilmHeader, FilmReader, Identity};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{self, Attempt, Ready};
-use super::picture::{self, Picture};
+use super::picture::Picture;
 use super::setup::RenderSetup;
 use super::threads::{Pool, Workers};
 use super::{
-    Ending, MOST_PIXELS, Method, Progress, Reconstruct, RenderError, RenderResult, Seconds, Settings,
-    environment_visibility, gaps, reconstruction,
+    Ending, Layers, MOST_PIXELS, Method, Progress, Reconstruct, RenderError, RenderResult, Seconds, Settings,
+    environment_visibility, gaps, layers, reconstruction,
 };
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
@@ -140,8 +140,7 @@ impl WithFeatures for Render<'_> {
         let (mut memory, mut film) = request.memory(built, &bank)?;
         let pixels = settings.width as usize * settings.height as usize;
         let mut clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
-        let left =
-            settings.stop.seconds.map(|limit| limit - clock.seconds() - picture::ending_seconds(pixels));
+        let left = settings.stop.seconds.map(|limit| limit - clock.seconds() - settings.ending_seconds());
         let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(left));
         let lights = built.lights.with_level(settings.level);
         let plain = RenderSetup { scene, bvh: built.bvh, lights, settings, workers: &workers };
@@ -153,6 +152,7 @@ impl WithFeatures for Render<'_> {
         let pilots = (!affords_pilots).then(|| Finding::new("pilots", LeftOut, "there is too little time"));
         let setup = RenderSetup { lights, settings, ..plain };
         let tracer = setup.paths::<F>(settings.seed);
+        let surfaces = layers::surfaces::<F>(&setup, &mut memory)?;
         let sketch = |workers: &Workers| gaps::sketch(&tracer, [settings.width, settings.height], workers);
         let is_open = settings.method.is_none() && resumed.is_none();
         let mut plan = if is_open { MethodPlan::open() } else { MethodPlan::from(method) };
@@ -199,7 +199,8 @@ impl WithFeatures for Render<'_> {
             let seconds = Seconds { build: built.seconds(), ..done.seconds };
             let findings = Findings::default().and(pilots).and(visibility).and(done.findings).and(raw);
             let (memory, memory_peak) = (own.uses(), own.peak());
-            return Ok(RenderResult { memory, memory_peak, seconds, findings, ..done });
+            let layers = Layers { surfaces, ..done.layers };
+            return Ok(RenderResult { layers, memory, memory_peak, seconds, findings, ..done });
         }
     }
 }

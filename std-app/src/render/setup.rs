@@ -10,6 +10,9 @@ use halflight_core::method::{MethodOptions, PathOptions, PilotSize, RenderContex
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathIntegrator, PathSettings, UNLIMITED};
 
+/// Seconds per pixel reserved for the picture and its file.
+const WRITING: f64 = 2e-7;
+
 /// Structures that all methods use.
 #[derive(Clone, Copy)]
 pub(super) struct RenderSetup<'a> {
@@ -50,6 +53,13 @@ impl Settings {
     fn paths(&self) -> PathSettings {
         let Settings { width, height, seed, max_depth, .. } = *self;
         PathSettings { width, height, seed, max_depth: max_depth.unwrap_or(UNLIMITED) }
+    }
+
+    /// Seconds reserved for the end of a picture: each layer takes as long as a picture of its channels.
+    pub(super) fn ending_seconds(&self) -> f64 {
+        let pixels = f64::from(self.width) * f64::from(self.height);
+        let channels = self.layers.as_ref().map_or(0, |layers| layers.channels());
+        WRITING * pixels * (1.0 + f64::from(channels) / 3.0)
     }
 
     /// Options of all methods.

@@ -30,6 +30,16 @@ impl Provenance {
             date: date(SystemTime::now()),
         }
     }
+
+    /// The command line as a shell reads it.
+    pub fn command_line(&self) -> String {
+        let is_plain = |c: char| c.is_alphanumeric() || "-_=+,./:@%".contains(c);
+        let quoted = |word: &String| match !word.is_empty() && word.chars().all(is_plain) {
+            true => word.clone(),
+            false => format!("'{}'", word.replace('\'', "'\\''")),
+        };
+        self.command.iter().map(quoted).collect::<Vec<_>>().join(" ")
+    }
 }
 
 fn processor() -> Option<String> {

@@ -4,6 +4,7 @@
 //! in a sticky folder, or a file in a read-only folder.
 
 use super::destination::{Destination, folder};
+use super::exr::ExrFile;
 use super::partial_file::{PartialFile, open_in_place, sync};
 use super::stream::{self, Patience};
 use super::{FileError, Format, Image, encode};
@@ -59,6 +60,15 @@ pub fn write(path: &Path, image: &Image) -> Result<(), FileError> {
 /// A file that cannot be written; the message names it.
 pub fn write_with(path: &Path, image: &Image, patience: Patience) -> Result<(), FileError> {
     let bytes = encode(image, Format::of(path)?).map_err(|error| error.at(path))?;
+    replace(path, &bytes, patience)
+}
+
+/// As [`write_with`], for an OpenEXR file with layers or attributes.
+///
+/// # Errors
+/// A file that cannot be written; the message names it.
+pub fn write_exr(path: &Path, file: ExrFile, patience: Patience) -> Result<(), FileError> {
+    let bytes = file.encode().map_err(|error| error.at(path))?;
     replace(path, &bytes, patience)
 }
 

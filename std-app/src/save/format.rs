@@ -1,14 +1,10 @@
 //! File formats of pictures, and their encoders.
 
+use super::exr::ExrFile;
 use super::{Image, display_byte};
 use crate::picture::{FileError, MAX_PIXELS, fail};
-use exr::image::write::layers::WritableLayers;
-use exr::image::{Blocks, Encoding, SpecificChannels};
-use exr::math::Vec2;
-use exr::prelude::{Compression, LineOrder, WritableImage};
 use image::codecs::{hdr::HdrEncoder, png::PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, Rgb};
-use std::io::Cursor;
 use std::path::Path;
 
 /// A file format, chosen by the extension of the file name.
@@ -66,7 +62,7 @@ pub fn encode(image: &Image, format: Format) -> Result<Vec<u8>, FileError> {
     }
     match format {
         Format::Png => encode_png(image),
-        Format::Exr => encode_exr(image),
+        Format::Exr => ExrFile::of(image).encode(),
         Format::Hdr => encode_hdr(image),
         Format::Pfm => Ok(encode_pfm(image)),
     }
@@ -78,33 +74,6 @@ fn encode_png(picture: &Image) -> Result<Vec<u8>, FileError> {
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
         .write_image(&samples, picture.width, picture.height, ExtendedColorType::Rgb8)
-        .map_err(FileError::new)?;
-    Ok(bytes)
-}
-
-fn encode_exr(picture: &Image) -> Result<Vec<u8>, FileError> {
-    let size = Vec2(picture.width as usize, picture.height as usize);
-    let pixel = |at: Vec2<usize>| <(f32, f32, f32)>::from(picture.pixels[at.y() * size.x() + at.x()]);
-    exr_bytes(&exr::image::Image::from_encoded_channels(size, EXR, SpecificChannels::rgb(pixel)))
-}
-
-/// Encoding of OpenEXR files.
-pub(crate) const EXR: Encoding = Encoding {
-    compression: Compression::ZIP16,
-    blocks: Blocks::ScanLines,
-    line_order: LineOrder::Increasing,
-};
-
-/// Bytes of an OpenEXR file.
-pub(crate) fn exr_bytes<'i, L: WritableLayers<'i>>(
-    image: &'i exr::image::Image<L>,
-) -> Result<Vec<u8>, FileError> {
-    let mut bytes = Vec::new();
-    image
-        .write()
-        // In parallel `exr` starts threads of its own.
-        .non_parallel()
-        .to_buffered(Cursor::new(&mut bytes))
         .map_err(FileError::new)?;
     Ok(bytes)
 }

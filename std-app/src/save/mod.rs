@@ -1,6 +1,7 @@
 //! Pictures in files: PNG for display, EXR, HDR and PFM for values. [`crate::picture`] reads all formats.
 
 mod destination;
+mod exr;
 mod file;
 mod format;
 mod image;
@@ -11,9 +12,12 @@ mod view;
 pub use crate::file_error::FileError;
 pub use crate::picture::MAX_PIXELS;
 pub use destination::{Destination, Identity};
-pub use file::{check_destination, check_writable, read, read_within, write, write_bytes, write_with};
+pub use exr::{Attribute, ExrFile};
+pub(crate) use exr::{EXR, exr_bytes};
+pub use file::{
+    check_destination, check_writable, read, read_within, write, write_bytes, write_exr, write_with,
+};
 pub(crate) use file::{replace, replace_with};
-pub(crate) use format::{EXR, exr_bytes};
 pub use format::{Format, encode};
 pub use image::{Image, display_byte, from_srgb, to_srgb};
 pub use partial_file::abandon;

@@ -65,7 +65,7 @@ objects! {
         #[serde(rename = "SCALE")] scale: Option<usize>,
     }
     LightOfNode { light: usize, }
-    Mesh { primitives: Vec<Primitive>, weights: Vec<f64>, }
+    Mesh { name: String, primitives: Vec<Primitive>, weights: Vec<f64>, }
     Primitive {
         attributes: Attributes,
         indices: Option<usize>,

@@ -159,13 +159,18 @@ impl Builder<'_> {
         let bytes = PART * (1 + self.model.meshes[index].len());
         // Joints place a mesh in the world.
         let placement = if skin.is_some() { Placement::IDENTITY } else { placement };
+        let of_mesh = self.buffers.document.meshes.get(number).map_or("", |mesh| &mesh.name);
+        let name = match (&node.name[..], of_mesh) {
+            ("", "") => format!("mesh {number}"),
+            ("", name) | (name, _) => name.to_owned(),
+        };
         let Some(instancing) = &node.extensions.instancing else {
             source.take(bytes)?;
-            self.model.instances.push((node.name.clone(), index, placement));
+            self.model.instances.push((name, index, placement));
             return Ok(());
         };
         for inner in self.instances(&instancing.attributes, bytes, source)? {
-            self.model.instances.push((node.name.clone(), index, placement.of(&inner)));
+            self.model.instances.push((name.clone(), index, placement.of(&inner)));
         }
         Ok(())
     }
