@@ -32,7 +32,12 @@ fn sky() -> Stage {
     };
     let to_map = Mat3::from_cols(Vec3::new(0.0, 0.0, 1.0), Vec3::X, Vec3::Y);
     Stage {
-        environment: Some(Environment { radiance: Rgb::splat(0.5), map: Some(TextureId(0)), to_map }),
+        environment: Some(Environment {
+            radiance: Rgb::splat(0.5),
+            map: Some(TextureId(0)),
+            to_map,
+            disc: None,
+        }),
         textures: vec![map],
         ..Stage::default()
     }
@@ -90,7 +95,12 @@ fn environment_samples_have_the_density_that_is_stated() {
 #[test]
 fn environment_irradiance_is_that_of_uniform_directions() {
     let constant = Stage {
-        environment: Some(Environment { radiance: Rgb::splat(2.0), map: None, to_map: Mat3::IDENTITY }),
+        environment: Some(Environment {
+            radiance: Rgb::splat(2.0),
+            map: None,
+            to_map: Mat3::IDENTITY,
+            disc: None,
+        }),
         ..Stage::default()
     };
     for (name, stage) in [("sky", sky()), ("constant", constant)] {

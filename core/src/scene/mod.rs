@@ -16,7 +16,7 @@ mod texture;
 pub use camera::{Camera, Projection, StartPlane};
 pub(crate) use class::{CAUSTIC_ALPHA, SMOOTH_ALPHA};
 pub use input::{ColorInput, ScalarInput};
-pub use light::{Environment, PointLight};
+pub use light::{DistantDisc, Environment, PointLight};
 pub use material::{Material, NormalMap, Surface};
 pub use mesh::{Mesh, Triangle};
 pub use overlap::Overlap;

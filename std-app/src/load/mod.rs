@@ -330,8 +330,12 @@ impl SceneBuilder {
         notes.merge(core::mem::take(&mut textures.notes));
         let environment = environment.map(|entry| Environment {
             radiance: entry.radiance,
-            map: textures.colour(entry.map.as_ref()),
+            map: match entry.picture {
+                Some(picture) => Some(textures.add(picture)),
+                None => textures.colour(entry.map.as_ref()),
+            },
             to_map: entry.to_map,
+            disc: entry.disc,
         });
 
         let derived = textures.derived_bytes();

@@ -4,10 +4,11 @@ use super::values::{BRIGHTEST, Colour, Matrix, Rotation};
 use super::{LoadError, Source};
 use crate::load::map::Map;
 use crate::load::transform::{SceneTransform, direction as direction_between};
+use crate::picture::Picture;
 use crate::values::{ConeAngle, Degrees, Number};
 use glam::{DMat3, Mat3};
 use halflight_core::Rgb;
-use halflight_core::scene::PointLight;
+use halflight_core::scene::{DistantDisc, PointLight};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -65,7 +66,10 @@ pub struct EnvironmentEntry {
 pub(in crate::load) struct EnvironmentChange {
     pub(in crate::load) radiance: Rgb,
     pub(in crate::load) map: Option<Map>,
+    /// A map that is no file, instead of `map`; its memory is taken.
+    pub(in crate::load) picture: Option<Picture>,
     pub(in crate::load) to_map: Mat3,
+    pub(in crate::load) disc: Option<DistantDisc>,
 }
 
 /// Error of a rotation matrix: files have six or more digits.
@@ -94,7 +98,9 @@ impl EnvironmentEntry {
         Ok(EnvironmentChange {
             radiance: rgb(self.radiance.map_or([1.0; 3], Colour::channels)),
             map,
+            picture: None,
             to_map: to_world.transpose().as_mat3(),
+            disc: None,
         })
     }
 }

@@ -4,12 +4,14 @@
 
 mod light;
 mod material;
+mod sky;
 mod values;
 
 pub(super) use light::EnvironmentChange;
 pub use light::{EnvironmentEntry, LightEntry, LightKind};
 pub(super) use material::MaterialChange;
 pub use material::{MaterialEntry, MaterialKind};
+pub use sky::SkyEntry;
 pub(super) use values::BRIGHTEST;
 pub use values::{Colour, Factors, Matrix, Reflectance, Rotation};
 
@@ -46,6 +48,8 @@ pub struct SceneFile {
     pub light: Vec<Spanned<LightEntry>>,
     /// `[environment]`: infinitely distant light.
     pub environment: Option<EnvironmentEntry>,
+    /// `[sky]`: a clear sky with a sun, instead of `[environment]`.
+    pub sky: Option<Spanned<SkyEntry>>,
     /// `[render]`.
     #[serde(default)]
     pub render: RenderSettings,
@@ -185,7 +189,15 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     }
     let mesh_files: Vec<PathBuf> =
         scene.mesh.iter().map(|mesh| mesh.checked_file(&scene, &source)).collect::<Result<_, _>>()?;
-    let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
+    let environment = match (&scene.environment, &scene.sky) {
+        (Some(_), Some(sky)) => {
+            let problem = "this scene file has a [sky] and an [environment]";
+            return Err(source.error(sky.span(), problem, "leave out one of them"));
+        }
+        (Some(entry), None) => Some(entry.resolved(&source)?),
+        (None, Some(entry)) => Some(sky::environment(entry, &mut builder.budget, &source)?),
+        (None, None) => None,
+    };
     builder.notes = source.notes.take();
     builder.lookup = source.lookup.take();
     for (mesh, file) in scene.mesh.iter().zip(mesh_files) {
