@@ -56,7 +56,8 @@ fn is_bright(light: Rgb) -> bool {
 mod tests {
     use super::*;
     use crate::scene::{
-        Camera, ColorInput, Material, Mesh, Surface, Texels, Texture, TextureTransform, Triangle, Wrap,
+        Camera, CameraKind, ColorInput, Material, Mesh, Surface, Texels, Texture, TextureTransform, Triangle,
+        Wrap,
     };
     use glam::Mat3;
 
@@ -73,6 +74,7 @@ mod tests {
         lights: &[],
         environment: None,
         camera: Camera {
+            kind: CameraKind::Perspective,
             eye: Vec3::ZERO,
             right: Vec3::X,
             up: Vec3::Y,

@@ -9,11 +9,13 @@ mod input;
 mod light;
 mod material;
 mod mesh;
+mod orthographic;
 mod overlap;
+mod panorama;
 mod surface;
 mod texture;
 
-pub use camera::{Camera, Projection, StartPlane};
+pub use camera::{Camera, CameraKind, PixelWidth, Projection, StartPlane};
 pub(crate) use class::{CAUSTIC_ALPHA, SMOOTH_ALPHA};
 pub use input::{ColorInput, ScalarInput};
 pub use light::{DistantDisc, Environment, PointLight};

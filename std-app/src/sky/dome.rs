@@ -74,3 +74,83 @@ impl Dome {
         sum.map(|sum| sum * PI / (2 * ROWS * ROWS) as f64)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Elevation of the sun, turbidity and albedo; polar angle and azimuth from the sun in degrees, with the
+    /// radiance of the model by Mitsuba 3.9.1 (`sky` in RGB, times 106.857 and 683 / 179).
+    #[rustfmt::skip]
+    const REFERENCE: [([f64; 3], [([f64; 2], [f64; 3]); 3]); 4] = [
+        ([60.0, 3.0, 0.2], [
+            ([0.0, 0.0], [14.2289, 21.7879, 41.0323]),
+            ([40.0, 90.0], [12.5412, 22.3076, 44.4876]),
+            ([85.0, 200.0], [47.575, 70.4063, 101.0878]),
+        ]),
+        ([35.0, 2.5, 0.0], [
+            ([0.0, 0.0], [6.0501, 11.4681, 23.9107]),
+            ([70.0, 0.0], [64.8186, 80.6922, 96.9042]),
+            ([85.0, 200.0], [45.5778, 68.1783, 85.2]),
+        ]),
+        ([10.0, 6.0, 0.5], [
+            ([0.0, 0.0], [5.2756, 8.5917, 13.2563]),
+            ([40.0, 90.0], [8.6705, 12.8672, 17.8312]),
+            ([70.0, 0.0], [212.0472, 162.7096, 89.4764]),
+        ]),
+        ([1.0, 1.0, 1.0], [
+            ([0.0, 0.0], [2.0554, 2.8515, 3.1934]),
+            ([40.0, 90.0], [3.4699, 4.485, 4.6933]),
+            ([70.0, 0.0], [13.8339, 14.129, 10.7942]),
+        ]),
+    ];
+
+    #[test]
+    fn radiance_is_that_of_the_reference() {
+        for ([elevation, turbidity, albedo], directions) in REFERENCE {
+            let dome = Dome::new(elevation, turbidity, [albedo; 3], [0.0; 3]).unwrap();
+            for ([theta, azimuth], expected) in directions {
+                let (sun, theta) = (elevation.to_radians(), theta.to_radians());
+                let cos = theta.cos() * sun.sin() + theta.sin() * sun.cos() * azimuth.to_radians().cos();
+                let radiance = dome.radiance(theta, cos.acos());
+                for i in 0..3 {
+                    // Mitsuba interpolates in f32 too, in another order.
+                    assert!((radiance[i] / expected[i] - 1.0).abs() < 2e-3, "{radiance:?} {expected:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn irradiance_is_that_of_a_fine_integral() {
+        let dome = Dome::new(40.0, 4.0, [0.3; 3], [500.0; 3]).unwrap();
+        let (sun_sin, sun_cos) = 40f64.to_radians().sin_cos();
+        let (rows, mut sum) = (900, [0.0; 3]);
+        for i in 0..rows {
+            let theta = 0.5 * PI * (f64::from(i) + 0.5) / f64::from(rows);
+            for j in 0..rows {
+                let phi = 2.0 * PI * (f64::from(j) + 0.5) / f64::from(rows);
+                let cos = theta.cos() * sun_sin + theta.sin() * sun_cos * phi.cos();
+                let radiance = dome.radiance(theta, cos.acos());
+                for (sum, radiance) in sum.iter_mut().zip(radiance) {
+                    *sum += radiance * theta.cos() * theta.sin() * (PI / f64::from(rows)).powi(2);
+                }
+            }
+        }
+        for (found, expected) in dome.irradiance().into_iter().zip(sum) {
+            assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
+        }
+        let ground = dome.radiance(1.6, 1.0);
+        let expected = 0.3 / PI * (dome.irradiance()[0] + 500.0 * sun_sin);
+        assert!((ground[0] / expected - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn parameters_outside_of_the_model_are_refused() {
+        for [elevation, turbidity, albedo] in
+            [[-1.0, 3.0, 0.2], [91.0, 3.0, 0.2], [9.0, 0.5, 0.2], [9.0, 3.0, 2.0]]
+        {
+            assert_eq!(Dome::new(elevation, turbidity, [albedo; 3], [0.0; 3]).err(), Some(SkyError));
+        }
+    }
+}

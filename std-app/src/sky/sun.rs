@@ -79,3 +79,38 @@ fn colour_matching(wavelength: f64) -> [f64; 3] {
         lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn irradiance_outside_of_the_atmosphere_is_that_of_measurements() {
+        // Thekaekara 1973, at 500 nm: 1.942 W/(m² nm).
+        let sin = RADIUS_DEGREES.to_radians().sin();
+        let spectral = 10.0 * RADIANCE[12] * core::f64::consts::PI * sin * sin;
+        assert!((spectral / 1.942 - 1.0).abs() < 0.01, "{spectral}");
+    }
+
+    #[test]
+    fn the_observer_has_the_integrals_of_the_standard() {
+        let sum = |i: usize| (360..=830).map(|nm| colour_matching(f64::from(nm))[i]).sum::<f64>();
+        // CIE 1931: 106.857 each.
+        assert!((0..3).all(|i| (sum(i) / 106.857 - 1.0).abs() < 0.01), "{} {} {}", sum(0), sum(1), sum(2));
+    }
+
+    #[test]
+    fn the_sun_reddens_and_darkens_towards_the_horizon_and_in_haze() {
+        let lux = |[r, g, b]: [f64; 3]| 179.0 * (0.2126 * r + 0.7152 * g + 0.0722 * b);
+        let noon = irradiance(60.0, 3.0);
+        // Direct normal illuminance of a clear day: about 90 klx.
+        assert!((80e3..100e3).contains(&lux(noon)), "{}", lux(noon));
+        let mut last = irradiance(90.0, 3.0);
+        for elevation in [60.0, 30.0, 15.0, 5.0, 1.0] {
+            let next = irradiance(elevation, 3.0);
+            assert!(lux(next) < lux(last) && next[2] / next[0] < last[2] / last[0]);
+            last = next;
+        }
+        assert!(lux(irradiance(60.0, 6.0)) < lux(noon) && irradiance(0.0, 10.0).iter().all(|x| *x >= 0.0));
+    }
+}
