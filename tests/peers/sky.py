@@ -1,6 +1,6 @@
 """The sky beside Mitsuba 3 and the solar position algorithm of NREL.
 
-    python3 tests/peers/sky.py [--positions 2000]
+    python3 tests/peers/sky.py [--positions 500]
 
 Prints three tables: the largest differences of the position of the sun to `pvlib` at random times and places of
 1980 to 2050; those of a panorama of our sky to the model of Mitsuba's `sunsky` at the directions of its pixels; and the
@@ -142,7 +142,7 @@ def suns(folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--positions", type=int, default=2000)
+    parser.add_argument("--positions", type=int, default=500)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
