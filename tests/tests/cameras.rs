@@ -88,7 +88,7 @@ fn a_panorama_of_an_environment_is_its_map() {
             expected += value(TAU * at(i % size, k % SUB), PI * at(i / size, k / SUB));
         }
         expected /= f64::from(SUB * SUB);
-        // Of 256 stratified samples of a smooth function.
+        // Noise of 256 stratified samples of a smooth function.
         assert!((f64::from(pixel[0]) - expected).abs() < 2e-3, "pixel {i}: {} {expected}", pixel[0]);
     }
 }

@@ -27,8 +27,8 @@ impl Camera {
         }
     }
 
-    /// Width of a pixel of a picture of `height` pixels: in the middle of a perspective, along a meridian of a
-    /// panorama.
+    /// Width of a pixel of a picture of `height` pixels: in the middle of a perspective, along a meridian of
+    /// a panorama.
     pub fn pixel_width(&self, height: u32) -> PixelWidth {
         let (height, none) = (height as f32, PixelWidth { at_eye: 0.0, per_length: 0.0 });
         match self.kind {

@@ -11,7 +11,8 @@ pub(super) struct CropArgs {
     /// Render and save a window of the picture alone: its upper left pixel and its size. Its pixels are those
     /// of the whole picture
     #[arg(long, value_name = "X,Y,WxH", value_parser = window,
-        conflicts_with_all = ["shard", "checkpoint", "resume", "reference", "report"], help_heading = "Parts")]
+        conflicts_with_all = ["shard", "checkpoint", "resume", "reference", "report"],
+        help_heading = "Parts")]
     crop: Option<Window>,
 }
 

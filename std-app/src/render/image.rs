@@ -35,9 +35,17 @@ pub(super) fn without_gaps(
     (image, gaps)
 }
 
-/// The part of `values`, row by row of a picture of `width` pixels, in the window of the render; all without
-/// a window.
-pub(super) fn in_window<T: Copy>(values: Vec<T>, width: u32, shard: Shard) -> Vec<T> {
+/// The parts of the picture, its variance and its samples in the window of the render; all without a window.
+pub(super) fn in_window(
+    (image, variance, samples): (Image, Image, Vec<u32>),
+    shard: Shard,
+) -> (Image, Image, Vec<u32>) {
+    let samples = values_in_window(samples, image.width, shard);
+    (image_in_window(image, shard), image_in_window(variance, shard), samples)
+}
+
+/// The part of `values`, row by row of a picture of `width` pixels, in the window of the render.
+fn values_in_window<T: Copy>(values: Vec<T>, width: u32, shard: Shard) -> Vec<T> {
     let Some(window) = shard.window else { return values };
     let rows = values.chunks(width.max(1) as usize).skip(window.corner()[1] as usize);
     let rows = rows.take(window.size()[1] as usize);
@@ -46,9 +54,9 @@ pub(super) fn in_window<T: Copy>(values: Vec<T>, width: u32, shard: Shard) -> Ve
 }
 
 /// The part of `image` in the window of the render.
-pub(super) fn image_in_window(image: Image, shard: Shard) -> Image {
+fn image_in_window(image: Image, shard: Shard) -> Image {
     let [width, height] = shard.window.map_or([image.width, image.height], |window| window.size());
-    Image { width, height, pixels: in_window(image.pixels, image.width, shard) }
+    Image { width, height, pixels: values_in_window(image.pixels, image.width, shard) }
 }
 
 /// Picture of a film, or its reconstruction if there is one.

@@ -4,7 +4,7 @@ use super::audit::ThreadedAudit;
 use super::files::{self, FilmHeader, FilmReader, Identity, RewrittenFile};
 use super::gaps::Sketch;
 use super::history::{Clock, Reference, Round};
-use super::image::{by_rows, image, image_in_window, in_window, variance, without_gaps};
+use super::image::{by_rows, image, in_window, variance, without_gaps};
 use super::memory::Memory;
 use super::method::Renderer;
 use super::rejected_tiles::{self, empty_pixels};
@@ -333,14 +333,12 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         if let Some(last) = self.history.last_mut() {
             last.error = error;
         }
-        let film = &state.film;
-        let made = reconstruction.as_ref();
+        let (film, made) = (&state.film, reconstruction.as_ref());
         let pictures = || (image(film, made), variance(film, made));
         let (image, variance) = workers.install(pictures);
         let samples: Vec<u32> = workers.install(|| by_rows(film, |pixel| pixel.count()).collect());
         let (image, filled_pixels) = without_gaps(image, &samples, (state, sketch, workers));
-        let (image, variance) = (image_in_window(image, state.shard), image_in_window(variance, state.shard));
-        let samples = in_window(samples, film.width(), state.shard);
+        let (image, variance, samples) = in_window((image, variance, samples), state.shard);
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
         // A report that does not fit into memory is omitted: the picture is complete.

@@ -1,5 +1,5 @@
-//! Radiance of a clear sky (Hosek and Wilkie 2012, the RGB data of the authors) above, and of a diffuse ground
-//! that sky and sun light below the horizon.
+//! Radiance of a clear sky (Hosek and Wilkie 2012, the RGB data of the authors) above, and of a diffuse
+//! ground that sky and sun light below the horizon.
 
 use super::UNITS;
 use core::f64::consts::PI;
@@ -21,10 +21,18 @@ pub struct Dome {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SkyError;
 
+impl core::fmt::Display for SkyError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "the sky model has suns above the horizon, turbidities of 1 to 10 and albedos of 0 to 1")
+    }
+}
+
+impl core::error::Error for SkyError {}
+
 impl Dome {
-    /// The sky of a sun at so many degrees above the horizon, 0 to 90, for a `turbidity` of 1 (pure air) to 10
-    /// (haze) and an `albedo` of the ground of 0 to 1, on which the sun shines with `of_sun`, the irradiance of
-    /// a surface that faces it.
+    /// The sky of a sun at so many degrees above the horizon, 0 to 90, for a `turbidity` of 1 (pure air) to
+    /// 10 (haze) and an `albedo` of the ground of 0 to 1. The sun gives a surface that faces it the irradiance
+    /// `of_sun`.
     ///
     /// # Errors
     /// Parameters outside of these ranges.

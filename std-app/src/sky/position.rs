@@ -1,5 +1,6 @@
 //! Position of the sun by place and time: low-accuracy algorithm of Meeus, "Astronomical Algorithms" (1998),
-//! chapters 12, 16, 22 and 25, which the NOAA calculator uses too. Its error is 0.01 degrees from 1950 to 2050.
+//! chapters 12, 16, 22 and 25, which the NOAA calculator uses too. Its error is 0.01 degrees from 1950 to
+//! 2050.
 
 /// Julian date of 2000-01-01, 12:00.
 const J2000: f64 = 2_451_545.0;

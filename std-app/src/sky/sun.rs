@@ -54,7 +54,7 @@ pub fn irradiance(elevation: f64, turbidity: f64) -> [f64; 3] {
             *sum += spectral * weight * WAVELENGTHS[1] * UNITS;
         }
     }
-    // Of the sun on the horizon the matrix makes a negative blue.
+    // The matrix makes a negative blue of a sun on the horizon.
     to_srgb(xyz).map(|channel| channel.max(0.0))
 }
 
