@@ -1,7 +1,6 @@
 //! Camera: perspective or orthographic with a pinhole or a thin lens, or a panorama. Raster coordinates are
 //! continuous, x to the right and y down; the centre of the first pixel is (0.5, 0.5).
 
-use super::panorama;
 use crate::Level;
 use crate::geometry::Ray;
 use crate::sampling::warp::concentric_disk;
@@ -116,7 +115,7 @@ impl Camera {
             CameraKind::Orthographic { half_height } => {
                 return self.parallel_ray(half_height, [width, height], [x, y], lens);
             }
-            CameraKind::Panorama => return panorama::ray(self, [width, height], [x, y]),
+            CameraKind::Panorama => return self.ray_of_panorama([width, height], [x, y]),
         }
         let pixel = 2.0 * self.tan_half_fov / height as f32;
         let film = Vec2::new(x - 0.5 * width as f32, 0.5 * height as f32 - y) * pixel;
@@ -170,7 +169,7 @@ impl Camera {
             CameraKind::Orthographic { half_height } => {
                 return self.project_parallel(half_height, [width, height], point, lens);
             }
-            CameraKind::Panorama => return panorama::project(self, [width, height], point),
+            CameraKind::Panorama => return self.project_to_panorama([width, height], point),
         }
         let mut offset = Vec2::ZERO;
         if self.lens_radius > 0.0 {

@@ -53,7 +53,7 @@ pub use transform::{SceneTransform, direction};
 use crate::memory::{self, Budget, Shortage};
 use core::ops::Range;
 use files::Lookup;
-use halflight_core::scene::{Environment, Material};
+use halflight_core::scene::Material;
 use library::{Library, Sources};
 use models::ReadModel;
 use mtl::MtlMaterial;
@@ -328,15 +328,7 @@ impl SceneBuilder {
         };
         let mut materials: Vec<Material> = (0..).zip(&self.materials).map(resolved).collect();
         notes.merge(core::mem::take(&mut textures.notes));
-        let environment = environment.map(|entry| Environment {
-            radiance: entry.radiance,
-            map: match entry.picture {
-                Some(picture) => Some(textures.add(picture)),
-                None => textures.colour(entry.map.as_ref()),
-            },
-            to_map: entry.to_map,
-            disc: entry.disc,
-        });
+        let environment = environment.map(|entry| entry.in_core(&mut textures));
 
         let derived = textures.derived_bytes();
         self.budget.take(derived).map_err(|why| too_large(path, &why))?;

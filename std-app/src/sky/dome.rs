@@ -31,8 +31,8 @@ impl core::error::Error for SkyError {}
 
 impl Dome {
     /// The sky of a sun at so many degrees above the horizon, 0 to 90, for a `turbidity` of 1 (pure air) to
-    /// 10 (haze) and an `albedo` of the ground of 0 to 1. The sun gives a surface that faces it the irradiance
-    /// `of_sun`.
+    /// 10 (haze) and an `albedo` of the ground of 0 to 1. The sun gives a surface that faces it the
+    /// irradiance `of_sun`.
     ///
     /// # Errors
     /// Parameters outside of these ranges.

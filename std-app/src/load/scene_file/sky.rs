@@ -3,6 +3,7 @@
 use super::light::EnvironmentChange;
 use super::values::Reflectance;
 use super::{LoadError, Source};
+use crate::load::MORE_MEMORY;
 use crate::load::transform::direction;
 use crate::memory::Budget;
 use crate::picture::{Picture, Samples};
@@ -180,11 +181,7 @@ pub(super) fn environment(
     let turbidity = sky.turbidity.map_or(DEFAULT_TURBIDITY, f64::from);
     let albedo = sky.ground_albedo.map_or([DEFAULT_ALBEDO; 3], Reflectance::channels);
     budget.take(sky::MAP_BYTES).map_err(|why| {
-        source.error(
-            entry.span(),
-            format!("no room for the map of the sky: {why}"),
-            super::super::MORE_MEMORY,
-        )
+        source.error(entry.span(), format!("no room for the map of the sky: {why}"), MORE_MEMORY)
     })?;
     let irradiance = sky::irradiance(elevation, turbidity).map(|channel| channel * of_sun);
     // The model is without intensity: so is the light of the sun on its ground.
