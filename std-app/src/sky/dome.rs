@@ -87,10 +87,13 @@ impl Dome {
 mod tests {
     use super::*;
 
-    /// Elevation of the sun, turbidity and albedo; polar angle and azimuth from the sun in degrees, with the
-    /// radiance of the model by Mitsuba 3.9.1 (`sky` in RGB, times 106.857 and 683 / 179).
+    /// Polar angle and azimuth from the sun in degrees, and the radiance there.
+    type Sample = ([f64; 2], [f64; 3]);
+
+    /// Elevation of the sun in degrees, turbidity and albedo, with the radiance of the model by Mitsuba 3.9.1
+    /// (`sunsky` in RGB, times 106.857 and 683 / 179).
     #[rustfmt::skip]
-    const REFERENCE: [([f64; 3], [([f64; 2], [f64; 3]); 3]); 4] = [
+    const REFERENCE: [([f64; 3], [Sample; 3]); 4] = [
         ([60.0, 3.0, 0.2], [
             ([0.0, 0.0], [14.2289, 21.7879, 41.0323]),
             ([40.0, 90.0], [12.5412, 22.3076, 44.4876]),

@@ -7,7 +7,7 @@ const J2000: f64 = 2_451_545.0;
 
 /// Difference of terrestrial and universal time in days, within a minute from 1960 to 2050. The sun moves
 /// 0.0007 degrees in a minute.
-const DELTA_T: f64 = 69.0 / 86_400.0;
+const DELTA_T: f64 = 69.0 / 86400.0;
 
 /// Horizontal parallax of the sun in degrees.
 const PARALLAX: f64 = 8.794 / 3600.0;
@@ -53,9 +53,9 @@ impl Moment {
 
     /// Apparent right ascension and declination of the sun in degrees, and the nutation in right ascension.
     fn equatorial(self) -> (f64, f64, f64) {
-        let t = (self.julian + DELTA_T - J2000) / 36_525.0;
-        let mean_longitude = 280.46646 + t * (36_000.76983 + t * 0.000_303_2);
-        let anomaly = (357.52911 + t * (35_999.05029 - t * 0.000_153_7)).to_radians();
+        let t = (self.julian + DELTA_T - J2000) / 36525.0;
+        let mean_longitude = 280.46646 + t * (36000.76983 + t * 0.000_303_2);
+        let anomaly = (357.52911 + t * (35999.05029 - t * 0.000_153_7)).to_radians();
         let centre = (1.914602 - t * (0.004817 + t * 0.000014)) * anomaly.sin()
             + (0.019993 - t * 0.000101) * (2.0 * anomaly).sin()
             + 0.000289 * (3.0 * anomaly).sin();
@@ -73,7 +73,7 @@ impl Moment {
     pub fn sun(self, latitude: f64, longitude: f64) -> SunPosition {
         let (right_ascension, declination, nutation) = self.equatorial();
         let days = self.julian - J2000;
-        let t = days / 36_525.0;
+        let t = days / 36525.0;
         let sidereal = 280.46061837 + 360.985_647_366_29 * days + t * t * 0.000_387_933 + nutation;
         let hour_angle = (sidereal + longitude - right_ascension).to_radians();
         let (sin_lat, cos_lat) = latitude.to_radians().sin_cos();
