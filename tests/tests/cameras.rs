@@ -134,6 +134,6 @@ fn methods_agree_with_paths_for_each_kind_of_camera() {
 #[test]
 fn pixels_of_an_orthographic_picture_have_the_size_of_their_points() {
     let camera = parallel();
-    let place = |x: f32| DVec3::from(camera.ray(SIZE, SIZE, x, 6.0, [0.5; 2]).at(3.0).as_dvec3());
+    let place = |x: f32| -> DVec3 { camera.ray(SIZE, SIZE, x, 6.0, [0.5; 2]).at(3.0).as_dvec3() };
     assert!((place(7.0).distance(place(6.0)) - 0.1).abs() < 1e-6);
 }
