@@ -1,7 +1,7 @@
 //! Small rooms with any surfaces and lights, for targets that trace paths.
 
 use arbitrary::{Result, Unstructured};
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, Line};
@@ -39,7 +39,7 @@ pub(crate) fn with_room(
     let materials = materials();
     let lights = (0..lights % 4).map(|_| light(input)).collect::<Result<Vec<_>>>()?;
     let radiance = Rgb::splat(0.5);
-    let environment = (sky & 1 > 0).then_some(Environment { radiance, map: None, to_map: Mat3::IDENTITY });
+    let environment = (sky & 1 > 0).then_some(Environment::uniform(radiance));
     // Off the planes of surfaces, in which the textbook has no density of a splat.
     let eye = Vec3::from(place(input)?) + Vec3::new(0.0077, 0.0029, 0.0113);
     let mut camera = Camera::look_at(eye, Vec3::from(place(input)?), Vec3::Y, 70.0);

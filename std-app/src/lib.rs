@@ -64,6 +64,7 @@ pub mod render;
 mod renderer;
 pub mod report;
 pub mod save;
+pub mod sky;
 pub mod values;
 
 pub use error::Error;

@@ -60,6 +60,12 @@ checked! {
     Degrees(f64): x => (0.0..=180.0).contains(&x), "this angle must lie between 0 and 180 degrees";
     /// The half-angle in degrees of a cone that is not empty: f32 has a cosine below 1 for it.
     ConeAngle(f64): x => (0.05..=180.0).contains(&x), "the angle of a cone is from 0.05 to 180 degrees";
+    /// Degrees of latitude, north positive.
+    Latitude(f64): x => x.abs() <= 90.0, "a latitude is -90 to 90 degrees";
+    /// Degrees of longitude, east positive.
+    Longitude(f64): x => x.abs() <= 360.0, "a longitude is -180 to 180 degrees, east positive";
+    /// Turbidity of the air.
+    Turbidity(f64): x => (1.0..=10.0).contains(&x), "turbidity is 1 (pure air) to 10 (haze)";
     /// Seconds of rendering.
     Seconds(f64): x => x > 0.0 && x < f64::INFINITY, "a time is a finite number of seconds above 0";
     /// A relMSE at which to stop. Rounding of f32 alone has one of 1e-15.

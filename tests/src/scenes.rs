@@ -148,7 +148,7 @@ pub fn emitter(reflectance: f32, radiance: f32) -> Material {
 
 /// An environment of constant radiance.
 pub fn constant_environment(radiance: f32) -> Option<Environment> {
-    Some(Environment { radiance: Rgb::splat(radiance), map: None, to_map: Mat3::IDENTITY })
+    Some(Environment { radiance: Rgb::splat(radiance), map: None, to_map: Mat3::IDENTITY, disc: None })
 }
 
 /// The Cornell box by its published measurements, in units of 555.2 mm: walls, two blocks, a lamp.

@@ -6,7 +6,7 @@ use halflight_core::bsdf::All;
 use halflight_core::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use halflight_core::light::EmissionSampler;
 use halflight_core::photon::Photons;
-use halflight_core::scene::{PointLight, Scene};
+use halflight_core::scene::{Camera, PointLight, Scene};
 use halflight_core::transport::bidirectional::Counts;
 use halflight_core::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use halflight_core::transport::bidirectional::light_pass::{LightPass, TaskOutput, VERTICES_PER_TASK};
@@ -169,6 +169,22 @@ fn running_sums_weigh_paths_as_all_densities_do() {
             // All pixels of two samples, and splats. Short segments and narrow lobes magnify rounding.
             let Compared { values, wrong, worst } = compared;
             assert!(values > 512 && wrong <= values / 100 && worst < 1e-3, "{name} {radius:?} {compared:?}");
+        }
+    }
+}
+
+#[test]
+fn splats_and_weights_of_other_cameras_are_those_of_the_textbook() {
+    let mut buffers = cornell_box();
+    let inside = Camera::look_at(Vec3::new(0.5, 0.75, 0.35), Vec3::new(0.5, 0.2, 0.6), Vec3::Y, 40.0);
+    let parallel = inside.orthographic(0.5);
+    let lens = Camera { lens_radius: 0.03, focus_distance: 0.4, ..parallel };
+    for camera in [parallel, lens, inside.panorama()] {
+        buffers.camera = camera;
+        for radius in [None, Some(2.0)] {
+            let compared = compare(&buffers.scene(), 1, radius, |_, _| ());
+            let few = compared.values / 1000;
+            assert!(compared.values > 500 && compared.wrong <= few, "{:?}: {compared:?}", camera.kind);
         }
     }
 }

@@ -3,10 +3,11 @@
 use crate::picture::{self, assert_picture};
 use glam::Vec3;
 use halflight_core::Rgb;
-use halflight_core::scene::{Camera, Material, Surface};
+use halflight_core::scene::{Camera, CameraKind, Material, Surface};
 use halflight_tests::scenes::{SceneBuffers, constant_environment, emitter};
 
 const INSIDE: Camera = Camera {
+    kind: CameraKind::Perspective,
     eye: Vec3::new(0.1, -0.2, 0.3),
     right: Vec3::X,
     up: Vec3::Y,

@@ -7,7 +7,7 @@ use halflight_core::Rgb;
 use halflight_core::light::{LightSampler, emitted};
 use halflight_core::memory::Arena;
 use halflight_core::sampling::{Random, Sampler, warp};
-use halflight_core::scene::{Environment, PointLight};
+use halflight_core::scene::{DistantDisc, Environment, PointLight, Scene};
 use halflight_core::scene::{Texels, Texture, TextureId, TextureTransform, Wrap};
 use halflight_tests::memory::TestArena;
 
@@ -32,10 +32,51 @@ fn sky() -> Stage {
     };
     let to_map = Mat3::from_cols(Vec3::new(0.0, 0.0, 1.0), Vec3::X, Vec3::Y);
     Stage {
-        environment: Some(Environment { radiance: Rgb::splat(0.5), map: Some(TextureId(0)), to_map }),
+        environment: Some(Environment {
+            radiance: Rgb::splat(0.5),
+            map: Some(TextureId(0)),
+            to_map,
+            disc: None,
+        }),
         textures: vec![map],
         ..Stage::default()
     }
+}
+
+/// The sky with the disc of a sun, and a constant sky with one, which is wide enough for random directions.
+fn with_discs() -> [Stage; 2] {
+    let direction = Vec3::new(0.3, -0.4, 0.6).normalize();
+    let disc = DistantDisc::of_irradiance(direction, 0.1, Rgb::new(3.0, 2.0, 1.0));
+    let mut stages = [sky(), sky()];
+    for stage in &mut stages {
+        let environment = stage.environment.as_mut().expect("a sky");
+        environment.disc = Some(disc);
+    }
+    if let Some(environment) = &mut stages[1].environment {
+        environment.map = None;
+    }
+    stages
+}
+
+#[test]
+fn a_disc_gives_the_irradiance_that_is_asked_for() {
+    let mut stage = with_discs().into_iter().last().expect("two");
+    if let Some(environment) = &mut stage.environment {
+        environment.radiance = Rgb::ZERO;
+    }
+    stage.with_lights(|scene, lights| {
+        let disc = scene.environment.and_then(|sky| sky.disc).expect("a disc");
+        let (n, mut sum) = (1 << 12, 0.0f64);
+        for i in 0..n {
+            let sampler = Sampler::new(4, 0, i);
+            let [a, b] = sampler.pair(0);
+            let sample = lights.sample(scene, Vec3::ZERO, disc.direction, [a, b, sampler.single(1)]);
+            let cos = |direction: Vec3| f64::from(direction.dot(disc.direction));
+            sum += sample.map_or(0.0, |s| f64::from(s.radiance.x) * cos(s.direction) / f64::from(s.pdf));
+        }
+        // Nearly all samples hit the disc.
+        assert!((sum / f64::from(n) - 3.0).abs() < 0.01, "{}", sum / f64::from(n));
+    });
 }
 
 #[test]
@@ -56,44 +97,60 @@ fn the_sky_has_its_sun_where_the_convention_says() {
 #[test]
 fn environment_samples_have_the_density_that_is_stated() {
     // Estimates ∫ dω over each of 8 × 16 cells of directions by weights 1 / pdf; a z-test each.
-    let stage = sky();
-    stage.with_lights(|scene, lights| {
-        let n = 1 << 18;
-        let mut cells = vec![[0.0f64; 2]; 128];
-        let mut edges = 0;
-        for i in 0..n {
-            let random = Random::new(2, i);
-            let u = [0, 1, 2].map(|d| random.single(d));
-            let sample = lights.sample(scene, Vec3::ZERO, Vec3::ZERO, u).expect("the sky is all around");
-            let pdf = lights.pdf_escape(scene, Vec3::ZERO, Vec3::ZERO, sample.direction);
-            assert!(sample.distance == f32::INFINITY && !sample.delta);
-            // At the edge of two texels rounding may move the direction to the other one.
-            edges += u32::from((pdf / sample.pdf - 1.0).abs() > 1e-4);
-            let d = sample.direction;
-            let ring = ((0.5 * d.z + 0.5) * 8.0).min(7.0) as usize;
-            let slice = ((d.y.atan2(d.x) / core::f32::consts::TAU + 0.5) * 16.0).min(15.0) as usize;
-            let weight = 1.0 / f64::from(sample.pdf);
-            cells[ring * 16 + slice][0] += weight;
-            cells[ring * 16 + slice][1] += weight * weight;
-        }
-        assert!(edges <= n >> 14, "{edges} of {n} samples have another density when looked up");
-        let n = f64::from(n);
-        let exact = 4.0 * core::f64::consts::PI / 128.0;
-        for [sum, squares] in cells {
-            let mean = sum / n;
-            let sigma = ((squares / n - mean * mean) / n).sqrt();
-            assert!((mean - exact).abs() < SIGMAS * sigma, "{mean} ± {sigma} for {exact}");
-        }
-    });
+    let [disc, constant] = with_discs();
+    for stage in [sky(), disc, constant] {
+        stage.with_lights(samples_have_their_density);
+    }
+}
+
+fn samples_have_their_density(scene: &Scene, lights: &LightSampler) {
+    let n = 1 << 18;
+    let mut cells = vec![[0.0f64; 2]; 128];
+    let mut edges = 0;
+    for i in 0..n {
+        let random = Random::new(2, i);
+        let u = [0, 1, 2].map(|d| random.single(d));
+        // Samples of the map behind a disc are rejected.
+        let Some(sample) = lights.sample(scene, Vec3::ZERO, Vec3::ZERO, u) else {
+            let disc = scene.environment.and_then(|sky| sky.disc);
+            assert!(disc.is_some(), "the sky is all around");
+            continue;
+        };
+        let pdf = lights.pdf_escape(scene, Vec3::ZERO, Vec3::ZERO, sample.direction);
+        assert!(sample.distance == f32::INFINITY && !sample.delta);
+        // At the edge of two texels rounding may move the direction to the other one.
+        edges += u32::from((pdf / sample.pdf - 1.0).abs() > 1e-4);
+        let d = sample.direction;
+        let ring = ((0.5 * d.z + 0.5) * 8.0).min(7.0) as usize;
+        let slice = ((d.y.atan2(d.x) / core::f32::consts::TAU + 0.5) * 16.0).min(15.0) as usize;
+        let weight = 1.0 / f64::from(sample.pdf);
+        cells[ring * 16 + slice][0] += weight;
+        cells[ring * 16 + slice][1] += weight * weight;
+    }
+    assert!(edges <= n >> 14, "{edges} of {n} samples have another density when looked up");
+    let n = f64::from(n);
+    let exact = 4.0 * core::f64::consts::PI / 128.0;
+    for [sum, squares] in cells {
+        let mean = sum / n;
+        let sigma = ((squares / n - mean * mean) / n).sqrt();
+        assert!((mean - exact).abs() < SIGMAS * sigma, "{mean} ± {sigma} for {exact}");
+    }
 }
 
 #[test]
 fn environment_irradiance_is_that_of_uniform_directions() {
     let constant = Stage {
-        environment: Some(Environment { radiance: Rgb::splat(2.0), map: None, to_map: Mat3::IDENTITY }),
+        environment: Some(Environment {
+            radiance: Rgb::splat(2.0),
+            map: None,
+            to_map: Mat3::IDENTITY,
+            disc: None,
+        }),
         ..Stage::default()
     };
-    for (name, stage) in [("sky", sky()), ("constant", constant)] {
+    let [disc, constant_disc] = with_discs();
+    let discs = [("disc", disc), ("constant with a disc", constant_disc)];
+    for (name, stage) in [("sky", sky()), ("constant", constant)].into_iter().chain(discs) {
         stage.with_lights(|scene, lights| {
             let environment = scene.environment.expect("both have one");
             let normal = Vec3::new(0.6, 0.0, 0.8);

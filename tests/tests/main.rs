@@ -8,6 +8,7 @@ mod bidirectional_reference;
 mod browser;
 mod bsdf;
 mod cache_file;
+mod cameras;
 mod caustics;
 mod caustics_cached;
 mod choice;

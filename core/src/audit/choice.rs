@@ -250,7 +250,7 @@ mod tests {
             |x, _| x as f32,
             |film| {
                 for index in 0..3 {
-                    let shard = Shard { index, count: 3 };
+                    let shard = Shard::part(index, 3);
                     let (pixels, weights) = chosen(film, (shard, 25.0, 1), None);
                     // A third of 256, as closely as tiles of 16 x 16 divide 50 x 40.
                     assert!((70..105).contains(&pixels.len()), "{}", pixels.len());

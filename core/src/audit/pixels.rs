@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn shards_merge_to_strata_of_the_picture_in_memory_of_the_stated_size() {
-        let shards = [0, 1, 2].map(|index| Shard { index, count: 3 });
+        let shards = [0, 1, 2].map(|index| Shard::part(index, 3));
         let pixels = shards.map(pixels);
         let weights = [0, 1, 2].map(|i| vec![1.0f32; pixels[i].len()]);
         with_film(|film| {

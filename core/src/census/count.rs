@@ -88,7 +88,9 @@ impl Census {
             thin_lens: scene.camera.lens_radius > 0.0,
             environment: match &scene.environment {
                 None => EnvironmentKind::None,
-                Some(environment) if environment.map.is_some() => EnvironmentKind::Map,
+                Some(environment) if environment.map.is_some() || environment.disc.is_some() => {
+                    EnvironmentKind::Map
+                }
                 Some(_) => EnvironmentKind::Constant,
             },
             ..Census::default()

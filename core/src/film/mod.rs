@@ -5,11 +5,13 @@ mod pixel;
 mod samples;
 mod splat;
 mod tile;
+mod window;
 
 pub use pixel::{Dropped, Half, Pixel};
 pub use samples::{CIRCLE, CIRCLES, GROUP, GROUPS};
 pub use splat::{STRIPS, Splat, StripOffsets, add_strip, sort_by_strip, strip_length};
 pub use tile::{PIXELS_PER_TILE, PixelSet, REACH, SPAN, TILE, Tile};
+pub use window::PixelWindow;
 
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};

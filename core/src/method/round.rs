@@ -1,28 +1,41 @@
 //! The film of a render in progress, and the rounds that add samples to it.
 
 use super::executor::{Executor, Passed, Worker};
-use crate::film::{Dropped, Film, PIXELS_PER_TILE, Pixel, Tile};
+use crate::film::{Dropped, Film, PIXELS_PER_TILE, Pixel, PixelWindow, Tile};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::Counters;
 use core::ops::Range;
 
-/// A part of a picture: every `count`th tile from tile `index` on. The shards of a picture are rendered apart
-/// and merged to the same bits as one render.
+/// A part of a picture: every `count`th tile from tile `index` on, or the tiles of a window. The shards of a
+/// picture are rendered apart and merged to the same bits as one render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// Number of the part, from 0.
     pub index: u32,
     /// Number of parts.
     pub count: u32,
+    /// The window whose tiles alone belong to the part; `None`: the picture.
+    pub window: Option<PixelWindow>,
 }
 
 impl Shard {
     /// The whole picture.
-    pub const WHOLE: Shard = Shard { index: 0, count: 1 };
+    pub const WHOLE: Shard = Shard::part(0, 1);
+
+    /// Part `index`, from 0, of `count` parts.
+    pub const fn part(index: u32, count: u32) -> Shard {
+        Shard { index, count, window: None }
+    }
+
+    /// The tiles of `window`.
+    pub const fn of_window(window: PixelWindow) -> Shard {
+        Shard { window: Some(window), ..Shard::WHOLE }
+    }
 
     /// True if `tile` belongs to it.
     pub fn owns(&self, tile: usize) -> bool {
         tile % self.count.max(1) as usize == self.index as usize
+            && self.window.is_none_or(|window| window.meets(tile))
     }
 }
 

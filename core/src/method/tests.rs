@@ -226,7 +226,8 @@ fn rounds_that_end_early_leave_the_picture_as_it_is() {
 #[test]
 fn environment_visibility_is_learned_in_rooms_that_see_little_of_it() {
     with_room(|context| {
-        let environment = Some(Environment { radiance: Rgb::ONE, map: None, to_map: Mat3::IDENTITY });
+        let environment =
+            Some(Environment { radiance: Rgb::ONE, map: None, to_map: Mat3::IDENTITY, disc: None });
         let scene = Scene { environment, lights: &[], ..*context.scene };
         let mut memory = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
         let lights = LightSampler::build(&scene, &mut Arena::over(&mut memory)).unwrap();

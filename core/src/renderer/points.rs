@@ -149,7 +149,8 @@ impl<'a> IrradianceRenderer<'a> {
         check_number(points)?;
         let PointSettings { seed, level, shard, .. } = *settings;
         let layout = Layout::of(points.len());
-        if shard.index >= shard.count || shard.count as usize > layout.tiles() {
+        let is_window = shard.window.is_some();
+        if is_window || shard.index >= shard.count || shard.count as usize > layout.tiles() {
             return Err(RenderError::Shard);
         }
         let [width, height] = layout.size();

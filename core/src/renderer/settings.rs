@@ -81,8 +81,9 @@ impl Settings {
         if self.audit.is_some_and(|fraction| !(0.0..1.0).contains(&fraction)) {
             return Err(RenderError::Audit);
         }
-        let Shard { index, count } = self.shard;
-        match index >= count || count as usize > Tile::count(width, height) {
+        let Shard { index, count, window } = self.shard;
+        let is_of_another = window.is_some_and(|window| window.frame() != self.size);
+        match is_of_another || index >= count || count as usize > Tile::count(width, height) {
             true => Err(RenderError::Shard),
             false => Ok(()),
         }

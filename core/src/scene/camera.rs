@@ -1,5 +1,5 @@
-//! Perspective camera: pinhole or thin lens. Raster coordinates are continuous, x to the right and y down;
-//! the centre of the first pixel is (0.5, 0.5).
+//! Camera: perspective or orthographic with a pinhole or a thin lens, or a panorama. Raster coordinates are
+//! continuous, x to the right and y down; the centre of the first pixel is (0.5, 0.5).
 
 use crate::Level;
 use crate::geometry::Ray;
@@ -7,9 +7,27 @@ use crate::sampling::warp::concentric_disk;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::shade::camera::CameraRays;
 
-/// Perspective camera.
+/// The map from directions or points to the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum CameraKind {
+    /// Rays from the eye, by [`Camera::tan_half_fov`].
+    #[default]
+    Perspective,
+    /// Parallel rays along `forward`, from the plane through the eye.
+    Orthographic {
+        /// Half of the vertical extent of the picture, a length.
+        half_height: f32,
+    },
+    /// Rays from the eye in all directions: latitude and longitude, with `forward` in the middle and `up` in
+    /// the top row. It has no lens.
+    Panorama,
+}
+
+/// Camera at an eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
+    /// The map to the picture.
+    pub kind: CameraKind,
     /// Position.
     pub eye: Vec3,
     /// Unit vector to the right of the picture.
@@ -18,13 +36,13 @@ pub struct Camera {
     pub up: Vec3,
     /// Unit vector into the picture.
     pub forward: Vec3,
-    /// Tangent of half of the vertical field of view.
+    /// Tangent of half of the vertical field of view of a perspective.
     pub tan_half_fov: f32,
     /// Radius of the lens; 0 for a pinhole.
     pub lens_radius: f32,
     /// Distance of the plane of focus along `forward`; unused by a pinhole.
     pub focus_distance: f32,
-    /// Start of rays of a camera very far from all surfaces; `None`: rays start at the eye.
+    /// Start of rays of a perspective very far from all surfaces; `None`: rays start at the eye.
     pub start: Option<StartPlane>,
 }
 
@@ -37,6 +55,15 @@ pub struct StartPlane {
     pub depth: f32,
 }
 
+/// Width of a pixel on the ray through it: `at_eye + per_length * distance`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelWidth {
+    /// At the start of the ray.
+    pub at_eye: f32,
+    /// Increase for a distance of 1.
+    pub per_length: f32,
+}
+
 /// Projection of a point to the picture, for light traced towards the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
@@ -47,7 +74,8 @@ pub struct Projection {
     /// Distance from the lens to the point.
     pub distance: f32,
     /// Density in solid angle at the lens of the rays of a uniformly sampled picture (raster area of
-    /// `width * height` pixels).
+    /// `width * height` pixels). Parallel rays have a density in area; it counts as that of a lens at
+    /// `distance`.
     pub pdf: f32,
 }
 
@@ -66,6 +94,7 @@ impl Camera {
             .unwrap_or_else(|| forward.any_orthonormal_vector());
         let half = (0.5 * vertical_fov_degrees).clamp(1e-10, 89.0).to_radians();
         Self {
+            kind: CameraKind::Perspective,
             eye,
             right,
             up: right.cross(forward),
@@ -81,6 +110,13 @@ impl Camera {
     /// 1)² chooses the point on the lens.
     #[inline]
     pub fn ray(&self, width: u32, height: u32, x: f32, y: f32, lens: [f32; 2]) -> Ray {
+        match self.kind {
+            CameraKind::Perspective => {}
+            CameraKind::Orthographic { half_height } => {
+                return self.parallel_ray(half_height, [width, height], [x, y], lens);
+            }
+            CameraKind::Panorama => return self.ray_of_panorama([width, height], [x, y]),
+        }
         let pixel = 2.0 * self.tan_half_fov / height as f32;
         let film = Vec2::new(x - 0.5 * width as f32, 0.5 * height as f32 - y) * pixel;
         let through = self.forward + film.x * self.right + film.y * self.up;
@@ -100,8 +136,8 @@ impl Camera {
         Ray::new(if self.start.is_some() { start(Vec2::ZERO) } else { self.eye }, through.normalize())
     }
 
-    /// [`Camera::ray`] through sixteen points of the picture, by columns and rows; `None` unless the camera
-    /// is a pinhole at `eye`.
+    /// [`Camera::ray`] through sixteen points of the picture, by columns and rows. False, with `out` as it
+    /// was, unless the camera is a perspective of a pinhole at `eye`.
     #[inline]
     pub(crate) fn rays(
         &self,
@@ -110,7 +146,7 @@ impl Camera {
         raster: &[[f32; 16]; 2],
         out: &mut [[f32; 8]; 16],
     ) -> bool {
-        if self.lens_radius > 0.0 || self.start.is_some() {
+        if self.lens_radius > 0.0 || self.start.is_some() || self.kind != CameraKind::Perspective {
             return false;
         }
         let rays = CameraRays {
@@ -128,6 +164,13 @@ impl Camera {
     /// behind the camera. The raster coordinates may lie outside the picture.
     #[inline]
     pub fn project(&self, width: u32, height: u32, point: Vec3, lens: [f32; 2]) -> Option<Projection> {
+        match self.kind {
+            CameraKind::Perspective => {}
+            CameraKind::Orthographic { half_height } => {
+                return self.project_parallel(half_height, [width, height], point, lens);
+            }
+            CameraKind::Panorama => return self.project_to_panorama([width, height], point),
+        }
         let mut offset = Vec2::ZERO;
         if self.lens_radius > 0.0 {
             offset = self.lens_radius * concentric_disk(lens);

@@ -1,6 +1,6 @@
 //! Scenes without light, whose pictures are black.
 
-use super::{PointLight, Scene, TextureId};
+use super::{Environment, PointLight, Scene, TextureId};
 use crate::Rgb;
 use glam::{Vec3, Vec4};
 
@@ -12,7 +12,8 @@ impl Scene<'_> {
             PointLight::Spot { intensity, cos_outer, .. } => is_bright(*intensity) && *cos_outer < 1.0,
             PointLight::Directional { irradiance, .. } => is_bright(*irradiance),
         };
-        let environment = self.environment.filter(|sky| self.shines(sky.radiance, sky.map));
+        let has_disc = |sky: &Environment| sky.disc.is_some_and(|disc| is_bright(disc.radiance));
+        let environment = self.environment.filter(|sky| has_disc(sky) || self.shines(sky.radiance, sky.map));
         environment.is_none() && !self.lights.iter().any(emits) && !self.has_emitter()
     }
 
@@ -55,7 +56,7 @@ fn is_bright(light: Rgb) -> bool {
 mod tests {
     use super::*;
     use crate::scene::{
-        Camera, ColorInput, Environment, Instances, Material, Mesh, Surface, Texels, Texture,
+        Camera, CameraKind, ColorInput, Instances, Material, Mesh, Surface, Texels, Texture,
         TextureTransform, Triangle, Wrap,
     };
     use glam::Mat3;
@@ -74,6 +75,7 @@ mod tests {
         lights: &[],
         environment: None,
         camera: Camera {
+            kind: CameraKind::Perspective,
             eye: Vec3::ZERO,
             right: Vec3::X,
             up: Vec3::Y,
@@ -133,7 +135,7 @@ mod tests {
             (Rgb::X, green, true),
             (Rgb::ZERO, green, true),
         ] {
-            let sky = Some(Environment { radiance: value, map, to_map: Mat3::IDENTITY });
+            let sky = Some(Environment { radiance: value, map, to_map: Mat3::IDENTITY, disc: None });
             assert_eq!(Scene { environment: sky, textures: &textures, ..PLAIN }.is_dark(), is_dark);
             let materials = [emissive(value, map)];
             let scene = Scene { materials: &materials, textures: &textures, ..PLAIN };

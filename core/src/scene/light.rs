@@ -47,11 +47,40 @@ pub struct Environment {
     pub map: Option<TextureId>,
     /// Rotation from world directions to those of the map.
     pub to_map: Mat3,
+    /// A disc in front of it, as the sun.
+    pub disc: Option<DistantDisc>,
+}
+
+/// Disc of constant radiance at infinity, as the sun. Paths hit it, and it is sampled by solid angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistantDisc {
+    /// Unit direction towards its centre.
+    pub direction: Vec3,
+    /// Distance of its edge from its centre on the unit sphere, above 0 and below 2.
+    pub chord: f32,
+    /// Radiance, in addition to that of the environment.
+    pub radiance: Rgb,
+}
+
+impl DistantDisc {
+    /// Disc of angular `radius` (radians, below a quarter turn) around unit `direction`, which gives a
+    /// surface that faces it this `irradiance`, W/m².
+    pub fn of_irradiance(direction: Vec3, radius: f32, irradiance: Rgb) -> Self {
+        let (sin, half) = (libm::sinf(radius), libm::sinf(0.5 * radius));
+        let radiance = irradiance / (core::f32::consts::PI * sin * sin);
+        Self { direction, chord: 2.0 * half, radiance }
+    }
+
+    /// True if unit direction `d` lies in the disc.
+    #[inline]
+    pub fn contains(&self, d: Vec3) -> bool {
+        d.distance_squared(self.direction) <= self.chord * self.chord
+    }
 }
 
 impl Environment {
     /// The same `radiance` from all directions.
     pub const fn uniform(radiance: Rgb) -> Self {
-        Self { radiance, map: None, to_map: Mat3::IDENTITY }
+        Self { radiance, map: None, to_map: Mat3::IDENTITY, disc: None }
     }
 }

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::values::{self, Lens};
 use clap::Args;
 use halflight::load::{LoadedScene, View};
-use halflight_core::scene::Camera;
+use halflight_core::scene::{Camera, CameraKind};
 
 /// Heading of the flags. `next_help_heading` would include flags of other structs.
 const CAMERA: &str = "Camera [default: that of the scene file, or one that frames the scene]";
@@ -49,9 +49,16 @@ impl CameraArgs {
             (camera, view) = (moved, Some(moved_view));
         }
         if let Some(degrees) = self.fov {
+            if camera.kind != CameraKind::Perspective {
+                return Err(Failure::new("--fov is of perspective cameras, and this one is another")
+                    .advice("the scene file has the `height` of an orthographic camera"));
+            }
             camera.tan_half_fov = (0.5 * degrees).to_radians().tan() as f32;
         }
         if let Some(Lens { radius, distance }) = self.lens {
+            if camera.kind == CameraKind::Panorama {
+                return Err(Failure::new("--lens: a panorama has no lens").advice("leave out --lens"));
+            }
             camera = scene.with_lens(camera, radius, distance).ok_or_else(|| {
                 Failure::new("--lens has more than 1000 times the distance in focus as its radius")
                     .advice("both are lengths in the units of the scene")
@@ -87,10 +94,10 @@ impl CameraArgs {
             return Err(Failure::new("the camera looks along its up vector")
                 .advice("give another up vector, as in --up 0,0,1"));
         }
-        let Camera { tan_half_fov, lens_radius, .. } = *old;
+        let Camera { kind, tan_half_fov, lens_radius, .. } = *old;
         let has_target = self.eye.is_some() || self.look_at.is_some();
         let focus_distance = if has_target { moved.focus_distance } else { old.focus_distance };
-        Ok((Camera { tan_half_fov, lens_radius, focus_distance, ..moved }, view))
+        Ok((Camera { kind, tan_half_fov, lens_radius, focus_distance, ..moved }, view))
     }
 }
 
@@ -99,7 +106,7 @@ fn named(name: &str, scene: &LoadedScene) -> Result<(Camera, Option<View>), Fail
     let cameras = &scene.cameras;
     let by_number = || name.parse::<usize>().ok().and_then(|number| cameras.get(number.checked_sub(1)?));
     let found = cameras.iter().find(|camera| camera.name == name).or_else(by_number);
-    let camera = found.and_then(|found| Some((scene.camera_at(found.view, found.fov_degrees)?, found.view)));
+    let camera = found.and_then(|found| Some((scene.camera_of(found.view, found.kind)?, found.view)));
     camera.map(|(camera, view)| (camera, Some(view))).ok_or_else(|| {
         let names: Vec<&str> = cameras.iter().map(|camera| &camera.name[..]).collect();
         let advice = match names.len() {

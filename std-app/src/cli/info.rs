@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::stdio::print_result;
 use super::values;
 use clap::Args;
-use halflight::load::{self, LoadOptions, LoadedScene, NamedCamera};
+use halflight::load::{self, LoadOptions, LoadedScene, NamedCamera, ViewKind};
 use halflight::quantity::{readable_bytes, readable_name};
 use halflight::report::{counts, left_out_array};
 use halflight_core::bsdf::All;
@@ -14,7 +14,7 @@ use halflight_core::census::{Census, Plan};
 use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::reconstruction::FilmReconstruction;
-use halflight_core::scene::Camera;
+use halflight_core::scene::{Camera, CameraKind, Environment};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -52,6 +52,7 @@ impl Info {
             ],
             plan: census.plan(),
             camera: CameraFacts::new(&scene.camera, &loaded),
+            sun: scene.environment.as_ref().and_then(SunFacts::new),
             counts: counts(&census, &scene),
             cameras: &loaded.cameras,
             repairs: &loaded.repairs,
@@ -64,7 +65,7 @@ impl Info {
 /// Camera in the units of the scene.
 struct CameraFacts {
     vectors: [(&'static str, [f64; 3]); 3],
-    fov: f64,
+    kind: ViewKind,
 }
 
 impl CameraFacts {
@@ -75,7 +76,42 @@ impl CameraFacts {
             ("look_at", loaded.transform.to_user(focus)),
             ("up", camera.up.to_array().map(f64::from)),
         ];
-        Self { vectors, fov: 2.0 * f64::from(camera.tan_half_fov).atan().to_degrees() }
+        let to_user = |length| length * 2f64.powi(loaded.transform.exponent);
+        let kind = match camera.kind {
+            CameraKind::Perspective => ViewKind::Perspective {
+                fov_degrees: 2.0 * f64::from(camera.tan_half_fov).atan().to_degrees(),
+            },
+            CameraKind::Orthographic { half_height } => {
+                ViewKind::Orthographic { height: to_user(2.0 * f64::from(half_height)) }
+            }
+            CameraKind::Panorama => ViewKind::Panorama,
+        };
+        Self { vectors, kind }
+    }
+}
+
+/// Sun of a sky: degrees above the horizon, and from north to east.
+struct SunFacts {
+    elevation: f64,
+    azimuth: f64,
+}
+
+impl SunFacts {
+    fn new(environment: &Environment) -> Option<Self> {
+        // The map of a sky has north, zenith and east along its axes.
+        let towards = environment.to_map.as_dmat3() * environment.disc?.direction.as_dvec3();
+        let [north, up, east] = towards.to_array();
+        let elevation = up.atan2(north.hypot(east)).to_degrees();
+        Some(Self { elevation, azimuth: east.atan2(north).to_degrees().rem_euclid(360.0) })
+    }
+}
+
+/// Name of a kind in scene files.
+fn name_of(kind: ViewKind) -> &'static str {
+    match kind {
+        ViewKind::Perspective { .. } => "perspective",
+        ViewKind::Orthographic { .. } => "orthographic",
+        ViewKind::Panorama => "panorama",
     }
 }
 
@@ -83,6 +119,7 @@ struct Facts<'a> {
     cameras: &'a [NamedCamera],
     repairs: &'a [String],
     camera: CameraFacts,
+    sun: Option<SunFacts>,
     counts: Vec<(&'static str, u64)>,
     plan: Plan,
     footprints: [(&'static str, usize); 5],
@@ -92,7 +129,13 @@ impl Facts<'_> {
     fn object(&self) -> Value {
         let mut camera: Map<String, Value> =
             self.camera.vectors.iter().map(|&(name, vector)| (name.into(), json!(vector))).collect();
-        camera.insert("fov".into(), self.camera.fov.into());
+        let (key, value) = match self.camera.kind {
+            ViewKind::Perspective { fov_degrees } => ("fov", Value::from(fov_degrees)),
+            ViewKind::Orthographic { height } => ("height", height.into()),
+            ViewKind::Panorama => ("fov", Value::Null),
+        };
+        camera.insert(key.into(), value);
+        camera.insert("kind".into(), name_of(self.camera.kind).into());
         let counts = self.counts.iter().map(|&(name, count)| (name.into(), count.into()));
         let memory = self.footprints.iter().map(|&(name, bytes)| (name.into(), bytes.into()));
         json!({
@@ -100,6 +143,7 @@ impl Facts<'_> {
             "features": self.plan.features.name(),
             "census": counts.collect::<Map<_, _>>(),
             "camera": camera,
+            "sun": self.sun.as_ref().map(|sun| json!({ "elevation": sun.elevation, "azimuth": sun.azimuth })),
             "cameras": self.cameras.iter().map(|camera| camera.name.as_str()).collect::<Value>(),
             "memory": memory.collect::<Map<_, _>>(),
             "left_out": left_out_array(self.plan.left_out()),
@@ -118,11 +162,22 @@ impl Facts<'_> {
             let [x, y, z] = vector.map(|value| value + 0.0);
             format!("  --{:<22} {x:.6},{y:.6},{z:.6}", name.replace('_', "-"))
         }));
-        lines.push(format!("  --{:<22} {:.3}", "fov", self.camera.fov));
+        match self.camera.kind {
+            ViewKind::Perspective { fov_degrees } => {
+                lines.push(format!("  --{:<22} {fov_degrees:.3}", "fov"));
+            }
+            ViewKind::Orthographic { height } => {
+                lines.push(line("kind", format!("{}, height {height:.6}", name_of(self.camera.kind))));
+            }
+            ViewKind::Panorama => lines.push(line("kind", name_of(self.camera.kind).into())),
+        }
         let named = |(number, camera): (usize, &NamedCamera)| {
             line("camera", format!("--camera {} ({})", number + 1, camera.name))
         };
         lines.extend(self.cameras.iter().enumerate().map(named));
+        lines.extend(self.sun.iter().map(|SunFacts { elevation, azimuth }| {
+            line("sun", format!("{elevation:.3} degrees above the horizon, azimuth {azimuth:.3}"))
+        }));
         lines.push("plan".into());
         lines.push(format!("  compiled for: {}", self.plan.features.name()));
         lines.extend(self.plan.left_out().map(|(what, why)| format!("  left out: {what} ({why})")));

@@ -7,6 +7,7 @@ mod bake_parts;
 mod camera_args;
 mod checkpoint_args;
 mod compare;
+mod crop_args;
 mod failure;
 mod info;
 mod interrupt;

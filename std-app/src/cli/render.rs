@@ -1,6 +1,7 @@
 //! `halflight render`: pictures of a scene, with an estimate of their error.
 
 use super::checkpoint_args::CheckpointArgs;
+use super::crop_args::CropArgs;
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::layer_args::LayerArgs;
@@ -67,6 +68,8 @@ pub(super) struct Render {
     #[arg(long, value_name = "I/N", value_parser = values::shard,
         conflicts_with_all = ["time", "error"], help_heading = "Parts")]
     shard: Option<Shard>,
+    #[command(flatten)]
+    crop: CropArgs,
 
     /// Start from the irradiance caches of a file: same scene and settings, any view
     #[arg(long, value_name = "FILE", help_heading = "Irradiance cache")]
@@ -113,8 +116,9 @@ impl Render {
             false => (stop, by_default),
         };
         let settings = self.picture.settings(&loaded, self.method, &self.method_args, stop, reference)?;
+        let window = self.crop.shard([settings.width, settings.height])?;
         let settings = Settings {
-            shard: self.shard.unwrap_or(Shard::WHOLE),
+            shard: self.shard.or(window).unwrap_or(Shard::WHOLE),
             checkpoint: self.checkpoint.checkpoint(),
             resume: self.checkpoint.resume(),
             load_cache: self.load_cache.clone(),

@@ -15,7 +15,11 @@ pub(super) fn text(run: &Run, report: Option<&Path>, by_default: bool) -> String
     lines.extend(report.map(|folder| format!("report {}", folder.join("index.html").display())));
     let early = if result.ending == Ending::Interrupted { ", stopped early" } else { "" };
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
-    lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
+    let part = settings.shard.window.map_or(String::new(), |window| {
+        let ([x, y], [across, down]) = (window.corner(), window.size());
+        format!("{across}x{down} pixels at {x},{y} of ")
+    });
+    lines.push(format!("image  {part}{width}x{height}, {samples} per pixel{early}"));
     match &result.audit {
         None => lines.extend(estimate(
             result.error,

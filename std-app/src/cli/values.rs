@@ -114,7 +114,7 @@ pub(super) fn shard(text: &str) -> Result<Shard, String> {
         .and_then(|(index, count)| Some((index.parse::<u32>().ok()?, count.parse::<u32>().ok()?)))
         .filter(|(index, count)| (1..=*count).contains(index))
         .ok_or("a shard is expected, as in 1/4, the first of four")?;
-    Ok(Shard { index: index - 1, count })
+    Ok(Shard::part(index - 1, count))
 }
 
 /// Share of the work for the audit: `5%`, `0.05`, or `off`.
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(lens("0.1,3"), Ok(Lens { radius: 0.1, distance: Some(3.0) }));
         assert_eq!(
             [shard("1/1"), shard("3/4")],
-            [(0, 1), (2, 4)].map(|(index, count)| Ok(Shard { index, count }))
+            [(0, 1), (2, 4)].map(|(index, count)| Ok(Shard::part(index, count)))
         );
         assert_eq!((field_of_view("40"), positive("0.01")), (Ok(40.0), Ok(0.01)));
         assert_eq!([audit("5%"), audit("0.25"), audit("off")], [Ok(0.05), Ok(0.25), Ok(0.0)]);

@@ -14,7 +14,7 @@ use super::{LoadError, LoadOptions, SceneBuilder, count_vertices, too_large};
 use super::{
     duplicate_emitters, fit, geometry, memory_estimate, open_glass, overlaps, surface, touching_glass,
 };
-use halflight_core::scene::{Environment, Material};
+use halflight_core::scene::Material;
 use std::path::Path;
 
 impl SceneBuilder {
@@ -43,11 +43,7 @@ impl SceneBuilder {
         };
         let mut materials: Vec<Material> = (0..).zip(&self.materials).map(resolved).collect();
         notes.merge(core::mem::take(&mut textures.notes));
-        let environment = environment.map(|entry| Environment {
-            radiance: entry.radiance,
-            map: textures.colour(entry.map.as_ref()),
-            to_map: entry.to_map,
-        });
+        let environment = environment.map(|entry| entry.in_core(&mut textures));
         self.budget.take(textures.derived_bytes()).map_err(|why| too_large(path, &why))?;
         let shared = match options.copies || options.keeps_texcoords {
             true => Shared::none(&self.meshes),

@@ -4,7 +4,7 @@
 use core::f64::consts::FRAC_PI_4;
 use glam::{DVec3, Vec3};
 use halflight_core::geometry::Bounds;
-use halflight_core::scene::{Camera, Mesh, StartPlane};
+use halflight_core::scene::{Camera, CameraKind, Mesh, StartPlane};
 
 /// Tangent of half the field of view of a long lens, at most.
 const LONG: f32 = 1e-3;
@@ -20,7 +20,7 @@ const MARGIN: f64 = 1e-5;
 
 /// Start of the rays of `camera`, which is at `eye` and looks `along` a unit vector; `None`: the eye.
 pub(super) fn start(mesh: &Mesh, camera: &Camera, eye: DVec3, along: DVec3) -> Option<StartPlane> {
-    if camera.tan_half_fov > LONG {
+    if camera.tan_half_fov > LONG || camera.kind != CameraKind::Perspective {
         return None;
     }
     let [right, up] = [camera.right, camera.up].map(Vec3::as_dvec3);

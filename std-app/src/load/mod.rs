@@ -50,7 +50,7 @@ pub use map::{Channel, Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
 pub use parts::{MaterialId, PartMesh, SceneParts};
-pub use scene::{LoadedScene, NamedCamera, RenderSettings, SceneViews, View};
+pub use scene::{LoadedScene, NamedCamera, RenderSettings, SceneViews, View, ViewKind};
 pub use texture_set::TextureSet;
 pub use transform::{SceneTransform, direction};
 

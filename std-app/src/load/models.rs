@@ -3,7 +3,7 @@
 use super::gltf;
 use super::placed::{PlacedMesh, Placement};
 use super::placed_light::PlacedLight;
-use super::scene::{NamedCamera, View};
+use super::scene::{NamedCamera, View, ViewKind};
 use super::{LoadError, MORE_MEMORY, SceneBuilder, obj, too_large};
 use crate::memory;
 use glam::DVec3;
@@ -89,8 +89,16 @@ impl SceneBuilder {
 /// A camera of a file that is placed in the scene.
 fn placed(camera: &NamedCamera, placement: &Placement) -> NamedCamera {
     let View { eye, look_at, up } = camera.view;
-    let up = (placement.linear * DVec3::from(up)).into();
+    let scaled = placement.linear * DVec3::from(up);
+    let kind = match camera.kind {
+        ViewKind::Orthographic { height } => {
+            ViewKind::Orthographic { height: height * scaled.length() / DVec3::from(up).length() }
+        }
+        other => other,
+    };
+    let up = scaled.into();
     NamedCamera {
+        kind,
         view: View { eye: placement.point(eye), look_at: placement.point(look_at), up },
         ..camera.clone()
     }

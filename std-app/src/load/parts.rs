@@ -142,7 +142,13 @@ impl SceneParts {
     pub fn build(self) -> Result<LoadedScene, LoadError> {
         let Self { builder, options, environment, view } = self;
         let name = Path::new("scene");
-        let sky = |radiance| EnvironmentChange { radiance, map: None, to_map: Mat3::IDENTITY };
+        let sky = |radiance| EnvironmentChange {
+            radiance,
+            map: None,
+            picture: None,
+            to_map: Mat3::IDENTITY,
+            disc: None,
+        };
         let mut loaded = builder.build(name, &options, environment.map(sky))?;
         loaded.files.clear();
         if let Some((view, fov_degrees)) = view {

@@ -100,8 +100,25 @@ pub struct NamedCamera {
     pub name: String,
     /// Position and direction.
     pub view: View,
-    /// Vertical field of view in degrees.
-    pub fov_degrees: f64,
+    /// The map to the picture.
+    pub kind: ViewKind,
+}
+
+/// The map to the picture, in the units of the files.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ViewKind {
+    /// Perspective.
+    Perspective {
+        /// Vertical field of view in degrees.
+        fov_degrees: f64,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Vertical extent of the picture.
+        height: f64,
+    },
+    /// All directions around the eye.
+    Panorama,
 }
 
 /// Sine of the angle between view and up below which rounding errors would rotate the picture.
@@ -156,16 +173,34 @@ impl LoadedScene {
 
     /// A pinhole camera at `view`; `None` if both of its points are equal.
     pub fn camera_at(&self, view: View, fov_degrees: f64) -> Option<Camera> {
+        self.camera_of(view, ViewKind::Perspective { fov_degrees })
+    }
+
+    /// A camera of any kind without a lens at `view`; `None` if both of its points are equal, or if the
+    /// height of an orthographic picture is not a positive number in f32.
+    pub fn camera_of(&self, view: View, kind: ViewKind) -> Option<Camera> {
         direction(view.eye, view.look_at)?;
         let distance = DVec3::from(view.eye).distance(view.look_at.into());
+        let fov_degrees = match kind {
+            ViewKind::Perspective { fov_degrees } => fov_degrees,
+            ViewKind::Orthographic { .. } | ViewKind::Panorama => DEFAULT_FOV,
+        };
         let camera = self.transform.camera(view.eye, view.look_at, view.up, fov_degrees);
-        Some(Camera { focus_distance: self.transform.length(distance) as f32, ..camera })
+        let camera = Camera { focus_distance: self.transform.length(distance) as f32, ..camera };
+        match kind {
+            ViewKind::Perspective { .. } => Some(camera),
+            ViewKind::Orthographic { height } => {
+                let height = self.transform.length(height) as f32;
+                (height > 0.0 && height < f32::INFINITY).then(|| camera.orthographic(height))
+            }
+            ViewKind::Panorama => Some(camera.panorama()),
+        }
     }
 
     /// The scene as its first camera sees it.
     pub(super) fn with_first_camera(mut self) -> Self {
         if let Some(first) = self.cameras.first() {
-            let camera = self.camera_at(first.view, first.fov_degrees);
+            let camera = self.camera_of(first.view, first.kind);
             (self.camera, self.view) =
                 (camera.map(|camera| self.with_start(camera, first.view)), Some(first.view));
         }
@@ -187,6 +222,9 @@ impl LoadedScene {
         self.camera.unwrap_or_else(|| Camera::framing(&self.mesh()))
     }
 }
+
+/// Vertical field of view in degrees of a perspective that replaces another kind of camera.
+pub(super) const DEFAULT_FOV: f64 = 40.0;
 
 /// Distance in focus from which all rays through a pixel are parallel in f32, and squares are finite.
 const FARTHEST_FOCUS: f64 = 1e15;

@@ -124,6 +124,12 @@ impl TextureSet {
         Some(id)
     }
 
+    /// A view of a picture of linear colours that is no file.
+    pub(super) fn add(&mut self, picture: Picture) -> TextureId {
+        self.pictures.push(picture);
+        self.view_of(self.pictures.len() - 1, &Map::default(), Content::Data)
+    }
+
     /// The picture of a map as numbers.
     pub(super) fn data(&mut self, map: Option<&Map>) -> Option<TextureId> {
         self.view(map?, Content::Data)

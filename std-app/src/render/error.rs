@@ -49,7 +49,11 @@ impl core::fmt::Display for RenderError {
                 write!(f, "not enough memory: at least {needed} bytes needed, {available} available")
             }
             Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
-            Self::Shard => write!(f, "shard I/N is invalid: N must not exceed the number of tiles"),
+            Self::Shard => write!(
+                f,
+                "shard I/N is invalid: N must not exceed the number of tiles; a window must lie in the \
+                 picture, and has no film file"
+            ),
             Self::NoCache => {
                 write!(f, "only the methods irradiance-cache and radiance-cache have a cache to load or save")
             }

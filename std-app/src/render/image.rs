@@ -9,29 +9,6 @@ use halflight_core::method::{RenderState, Shard};
 use halflight_core::reconstruction::FilmReconstruction;
 use rayon::prelude::*;
 
-/// `image` of a film with these `samples` of each pixel, with filled gaps, and the number of pixels in tiles
-/// without samples.
-pub(super) fn without_gaps(
-    mut image: Image,
-    samples: &[u32],
-    (state, sketch, workers): (&RenderState, &Sketch, &Workers),
-) -> (Image, u64) {
-    // Other shards fill the gaps of a shard.
-    if state.shard != Shard::WHOLE || !state.samples.contains(&0) {
-        return (image, 0);
-    }
-    let mut known: Vec<bool> = samples.iter().map(|&count| count > 0).collect();
-    let gaps = known.iter().filter(|known| !**known).count() as u64;
-    if known.iter().all(|known| !known) {
-        for ([x, y], light) in sketch(workers) {
-            let index = y as usize * image.width as usize + x as usize;
-            (image.pixels[index], known[index]) = (light, true);
-        }
-    }
-    gaps::fill(&mut image, &known);
-    (image, gaps)
-}
-
 /// Pictures of a film at the end of a render.
 pub(super) struct Pictures {
     pub(super) image: Image,
@@ -56,6 +33,59 @@ impl Pictures {
             layers: Layers { halves, ..Layers::default() },
         }
     }
+
+    /// The same with filled gaps in its picture, and the number of pixels in tiles without samples.
+    pub(super) fn without_gaps(
+        mut self,
+        (state, sketch, workers): (&RenderState, &Sketch, &Workers),
+    ) -> (Self, u64) {
+        let Shard { count, window, .. } = state.shard;
+        let is_sampled = (0..).zip(&*state.samples).all(|(tile, &n)| n > 0 || !state.shard.owns(tile));
+        // Other shards fill the gaps of a shard.
+        if count > 1 || is_sampled {
+            return (self, 0);
+        }
+        let image = &mut self.image;
+        let mut known: Vec<bool> = self.samples.iter().map(|&count| count > 0).collect();
+        let width = image.width;
+        let is_shown = |index: u32| window.is_none_or(|w| w.contains([index % width, index / width]));
+        let gaps = (0..).zip(&known).filter(|(index, known)| !**known && is_shown(*index)).count() as u64;
+        if known.iter().all(|known| !known) {
+            for ([x, y], light) in sketch(workers) {
+                let index = y as usize * width as usize + x as usize;
+                (image.pixels[index], known[index]) = (light, true);
+            }
+        }
+        gaps::fill(image, &known);
+        (self, gaps)
+    }
+
+    /// Their parts in the window of the render; all without a window.
+    pub(super) fn in_window(self, shard: Shard) -> Self {
+        let Self { image, variance, samples, layers } = self;
+        let halves = layers.halves.map(|halves| halves.map(|half| image_in_window(half, shard)));
+        Self {
+            samples: values_in_window(samples, image.width, shard),
+            image: image_in_window(image, shard),
+            variance: image_in_window(variance, shard),
+            layers: Layers { halves, ..layers },
+        }
+    }
+}
+
+/// The part of `values`, row by row of a picture of `width` pixels, in the window of the render.
+pub(super) fn values_in_window<T: Copy>(values: Vec<T>, width: u32, shard: Shard) -> Vec<T> {
+    let Some(window) = shard.window else { return values };
+    let rows = values.chunks(width.max(1) as usize).skip(window.corner()[1] as usize);
+    let rows = rows.take(window.size()[1] as usize);
+    let [left, across] = [window.corner()[0], window.size()[0]].map(|x| x as usize);
+    rows.flat_map(|row| row.iter().skip(left).take(across).copied()).collect()
+}
+
+/// The part of `image` in the window of the render.
+fn image_in_window(image: Image, shard: Shard) -> Image {
+    let [width, height] = shard.window.map_or([image.width, image.height], |window| window.size());
+    Image { width, height, pixels: values_in_window(image.pixels, image.width, shard) }
 }
 
 /// Picture of a film, or its reconstruction if there is one.

@@ -1,6 +1,7 @@
 //! Layers of a picture: their names, and the search of surfaces that fills those of surfaces.
 
 use super::RenderError;
+use super::image::values_in_window;
 use super::memory::Memory;
 use super::setup::RenderSetup;
 use super::threads::Threads;
@@ -156,5 +157,5 @@ pub(super) fn surfaces<F: Features>(
     let mut arena = Arena::over(&mut lines);
     let is_complete = search.layers(&wanted.objects, &mut surfaces, &mut arena, &mut executor)?;
     memory.give_back(RAYS);
-    Ok(if is_complete { surfaces } else { Vec::new() })
+    Ok(if is_complete { values_in_window(surfaces, settings.width, settings.shard) } else { Vec::new() })
 }

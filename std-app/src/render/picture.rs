@@ -4,7 +4,7 @@ use super::audit::ThreadedAudit;
 use super::files::{self, FilmHeader, FilmReader, Identity, RewrittenFile};
 use super::gaps::Sketch;
 use super::history::{Clock, Reference, Round};
-use super::image::{Pictures, image, without_gaps};
+use super::image::{Pictures, image};
 use super::memory::Memory;
 use super::method::Renderer;
 use super::rejected_tiles::{self, empty_pixels};
@@ -324,12 +324,11 @@ impl<'a, 'm, F: Features> Progressive<'a, 'm, F> {
         if let Some(last) = self.history.last_mut() {
             last.error = error;
         }
-        let film = &state.film;
-        let made = reconstruction.as_ref();
+        let (film, made) = (&state.film, reconstruction.as_ref());
         let halves = settings.layers.as_ref().is_some_and(|layers| layers.has(Layer::Halves));
-        let Pictures { image, variance, samples, layers } =
-            workers.install(|| Pictures::of(film, made, halves));
-        let (image, filled_pixels) = without_gaps(image, &samples, (state, sketch, workers));
+        let pictures = workers.install(|| Pictures::of(film, made, halves));
+        let (pictures, filled_pixels) = pictures.without_gaps((state, sketch, workers));
+        let Pictures { image, variance, samples, layers } = pictures.in_window(state.shard);
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
         // A report that does not fit into memory is omitted: the picture is complete.

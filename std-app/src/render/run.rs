@@ -60,9 +60,12 @@ impl<'a> Request<'a> {
         if settings.reference.as_ref().is_some_and(|reference| [reference.width, reference.height] != size) {
             return Err(RenderError::Reference);
         }
-        let Shard { index, count } = settings.shard;
+        let Shard { index, count, window } = settings.shard;
         let many = count as usize > Tile::count(settings.width, settings.height);
-        if index >= count || many {
+        // Film files have no windows.
+        let keeps = settings.checkpoint.is_some() || settings.resume.is_some();
+        let is_impossible = window.is_some_and(|window| keeps || window.frame() != size);
+        if index >= count || many || is_impossible {
             return Err(RenderError::Shard);
         }
         let bank = Bank::new();

@@ -4,7 +4,7 @@ use super::fit::{Fit, Point};
 use super::{Provenance, Race, Run, counts};
 use crate::compare::Comparison;
 use crate::render::{
-    Against, Audited, Ending, ErrorEstimate, NoiseAndBlur, Region, RejectedTile, RenderResult, Round, Shard,
+    Against, Audited, Ending, ErrorEstimate, NoiseAndBlur, Region, RejectedTile, RenderResult, Round,
     StopRule,
 };
 use halflight_core::census::Census;
@@ -69,7 +69,8 @@ pub(super) fn run(run: &Run) -> Value {
         "left_out": left_out_array(plan.left_out().chain(techniques_left_out(&result.findings))),
         "outputs": run.outputs.iter().map(|file| file_name(file)).collect::<Value>(),
         "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| file_name(&checkpoint.path)),
-        "shard": (shard != Shard::WHOLE).then(|| [shard.index + 1, shard.count]),
+        "shard": (shard.count > 1).then(|| [shard.index + 1, shard.count]),
+        "crop": shard.window.map(|window| [window.corner(), window.size()].concat()),
         "made": made(run.provenance),
     })
 }

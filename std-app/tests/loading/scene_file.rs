@@ -16,7 +16,7 @@ fn errors_have_line_and_column() {
     check(
         "[camera]\neyes = [0, 0, 0]\n",
         2,
-        "unknown field `eyes`\n  help: expected one of `eye`, `look_at`",
+        "unknown field `eyes`\n  help: expected one of `kind`, `eye`, `look_at`",
     );
     check("\n  [render\n", 2, "");
     check("[camera]\neye = [0, 0]\nlook_at = [0, 0, 1]", 2, "");

@@ -126,7 +126,7 @@ pub(crate) static SKY: [Texture<'static>; 1] = [Texture {
 /// The scene lit by [`SKY`].
 pub(crate) fn with_sky(mut scene: SceneBuffers) -> SceneBuffers {
     let to_map = Mat3::from_rotation_y(0.7);
-    scene.environment = Some(Environment { radiance: Rgb::ONE, map: Some(TextureId(0)), to_map });
+    scene.environment = Some(Environment { radiance: Rgb::ONE, map: Some(TextureId(0)), to_map, disc: None });
     scene
 }
 

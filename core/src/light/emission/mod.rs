@@ -409,7 +409,7 @@ mod tests {
                 assert_near(mean_power(&Scene { lights: &lights, ..*scene }, |_| {}), color * expected);
                 all += expected;
             }
-            let environment = Environment { radiance: color, map: None, to_map: glam::Mat3::IDENTITY };
+            let environment = Environment::uniform(color);
             let scene = Scene { environment: Some(environment), ..*scene };
             let from_sky = 4.0 * PI * disc;
             assert_near(mean_power(&scene, |_| {}), color * from_sky);

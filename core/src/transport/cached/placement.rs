@@ -7,6 +7,7 @@ use crate::bvh::Coherence;
 use crate::cache::radiance::ServedLobes;
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
+use crate::scene::PixelWidth;
 use crate::transport::cached::gather::GatherPoint;
 use crate::transport::path::{LightEstimator, PathIntegrator};
 use crate::transport::settings::Counters;
@@ -116,7 +117,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
             }
         }
         self.context.nearest_batch(&rays, Coherence::Incoherent, &mut hits);
-        let pixel = 2.0 * self.context.scene.camera.tan_half_fov / height as f32;
+        let pixel = self.context.scene.camera.pixel_width(height);
         for (i, place) in out.iter_mut().enumerate().take(PIXELS) {
             *place = GatherPoint::NONE;
             if let Some((x, y)) = order.pixel(first + i as u64) {
@@ -132,19 +133,19 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         self.context.scene.materials.iter().any(|material| material.surface.may_be_rough())
     }
 
-    /// First diffuse point, or point with a served lobe, of a camera ray with first hit `hit`. `spread` is
-    /// the width of a pixel at distance 1.
+    /// First diffuse point, or point with a served lobe, of a camera ray with first hit `hit`, whose `pixel`
+    /// has this width.
     fn first_diffuse(
         &self,
         (ray, mut hit): (Ray, Hit),
-        mut spread: f32,
+        pixel: PixelWidth,
         (sight, lobes): (Via, Option<&ServedLobes>),
         sampler: &Sampler,
         counters: &mut Counters,
     ) -> Option<GatherPoint> {
         let context = &self.context;
         let mut segment = Segment::first(ray);
-        let (mut width, mut seen) = (0.0, Via::Specular);
+        let (mut width, mut spread, mut seen) = (pixel.at_eye, pixel.per_length, Via::Specular);
         for segments in 1..=MOST_BOUNCES {
             let opacity = |n| sampler.single(dimension::CROSSING + n);
             let (met, point) = context.surface_from(hit, &mut segment, opacity, counters)?;

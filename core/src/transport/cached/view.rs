@@ -12,7 +12,7 @@ use crate::geometry::Frame;
 use crate::light::luminance;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
-use crate::scene::{Scene, Surface, SurfacePoint};
+use crate::scene::{CameraKind, Scene, Surface, SurfacePoint};
 use crate::transport::cached::gather::{GatherPoint, HemisphereSamples, NO_PIXEL};
 use crate::transport::cached::placement::ProgressiveOrder;
 use crate::transport::path::sharing::PathWave;
@@ -81,6 +81,10 @@ fn viewed_lobe<F: Features>(
     direction: Vec3,
 ) -> Option<(Bsdf, ViewedLobe, LobeKind)> {
     let (Surface::Conductor { .. } | Surface::Glossy { .. }) = point.material.surface else { return None };
+    // Records are bound to one eye.
+    if matches!(context.scene.camera.kind, CameraKind::Orthographic { .. }) {
+        return None;
+    }
     let to_eye = context.scene.camera.eye - point.position;
     let bsdf = context.bsdf_at(point);
     let lobe = ViewedLobe::new(&bsdf, point.frame.to_local(to_eye.normalize()), to_eye.length())?;
@@ -164,7 +168,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
         if lobes.is_some_and(|lobes| lobes.serves(&bsdf, point.frame.normal.dot(-direction))) {
             return None;
         }
-        let pixel = 2.0 * self.context.scene.camera.tan_half_fov / height as f32;
+        let pixel = self.context.scene.camera.pixel_width(height).per_length;
         let point = GatherPoint::of(&point, pixel * segment.length);
         Some((ViewPoint { point, kind, step }, bsdf, lobe))
     }

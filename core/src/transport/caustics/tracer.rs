@@ -215,7 +215,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         if at.cmplt(Vec2::ZERO).any() || at.cmpge(frame).any() {
             return None;
         }
-        let to_eye = camera.eye - position;
+        let eye = camera.origin_towards(position);
+        let to_eye = eye - position;
         let mut ray = Ray::segment(position + NEAR * to_eye, (1.0 - NEAR) * to_eye, 1.0);
         let mut crossed = 0;
         loop {
@@ -228,7 +229,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
             if crossed > MAX_GLASS || !point.material.may_pass_caustics() {
                 return None;
             }
-            ray = point.spawn_to(camera.eye);
+            ray = point.spawn_to(eye);
         }
     }
 

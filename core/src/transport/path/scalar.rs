@@ -73,8 +73,11 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
         (bsdf, found): (Bsdf, &E::Found),
     ) -> PathVertex<'v, 'a> {
         let segments = u32::from(path.segments);
-        let near = if segments == 1 { self.context.scene.camera.eye } else { path.position.into() };
-        let distance = near.distance(point.position);
+        let distance = match segments {
+            1 => self.context.scene.camera.origin_towards(point.position),
+            _ => path.position.into(),
+        }
+        .distance(point.position);
         PathVertex {
             path: ray.tag as usize,
             pixel: path.pixel,

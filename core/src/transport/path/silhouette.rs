@@ -15,7 +15,7 @@ use crate::film::{PIXELS_PER_TILE, PixelSet, REACH, SPAN, TILE, Tile};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
-use crate::scene::{Camera, Material, Scene};
+use crate::scene::{Camera, CameraKind, Material, Scene};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
@@ -99,7 +99,7 @@ impl TileCone {
 }
 
 /// Pixels of a tile that see the border of a lamp, without regard to occlusion. Empty with a lens or with
-/// cut-outs, where borders are not sharp.
+/// cut-outs, where borders are not sharp, and with parallel rays or a panorama.
 pub(in crate::transport) fn silhouette_pixels(
     scene: &Scene,
     lights: &LightSampler,
@@ -107,7 +107,7 @@ pub(in crate::transport) fn silhouette_pixels(
     tile: Tile,
 ) -> PixelSet {
     let camera = &scene.camera;
-    if camera.lens_radius > 0.0 {
+    if camera.lens_radius > 0.0 || camera.kind != CameraKind::Perspective {
         return PixelSet::default();
     }
     let mut rows = Rows::default();

@@ -4,7 +4,7 @@
 use crate::Level;
 use crate::bvh::Bvh;
 use crate::geometry::Bounds;
-use crate::scene::Scene;
+use crate::scene::{PixelWidth, Scene};
 use core::f32::consts::PI;
 use glam::Vec3;
 
@@ -27,8 +27,10 @@ const ALPHA: f64 = 2.0 / 3.0;
 #[derive(Clone, Copy, Debug)]
 pub struct RadiusSchedule {
     eye: Vec3,
-    /// Radius at distance 1.
+    /// Increase of the radius for a distance of 1.
     radius: f32,
+    /// Radius at the camera: of parallel rays, above zero.
+    at_eye: f32,
     nearest: f32,
 }
 
@@ -48,20 +50,20 @@ impl RadiusSchedule {
         }
         let nearest =
             (MIN_DISTANCE_IN_DIAGONALS * bvh.bounds().diagonal()).min(MIN_DISTANCE_OF_VISIBLE * seen);
-        let radius = 2.0 * camera.tan_half_fov / frame[1].max(1) as f32;
-        Self { eye: camera.eye, radius, nearest }
+        let PixelWidth { at_eye, per_length } = camera.pixel_width(frame[1].max(1));
+        Self { eye: camera.eye, radius: per_length, at_eye, nearest }
     }
 
     /// Schedule of the same `radius` everywhere within `bounds`.
     pub fn constant(radius: f32, bounds: &Bounds) -> Self {
         // No place is farther from the centre.
         let nearest = bounds.diagonal().max(f32::MIN_POSITIVE);
-        Self { eye: bounds.center(), radius: radius / nearest, nearest }
+        Self { eye: bounds.center(), radius: radius / nearest, at_eye: 0.0, nearest }
     }
 
     /// This schedule with a radius of `pixels` pixels.
     pub fn of_pixels(self, pixels: f32) -> Self {
-        Self { radius: pixels * self.radius, ..self }
+        Self { radius: pixels * self.radius, at_eye: pixels * self.at_eye, ..self }
     }
 
     /// Schedule of a progressive method after `samples` samples; the first sample has a radius of `pixels`
@@ -79,14 +81,14 @@ impl RadiusSchedule {
     /// Kernel radius at `place`.
     #[inline]
     pub fn radius(&self, place: Vec3) -> f32 {
-        self.radius * place.distance(self.eye).max(self.nearest)
+        self.at_eye + self.radius * place.distance(self.eye).max(self.nearest)
     }
 
     /// Kernel radius at `place` for a path of length `travelled` from the camera: a surface in a mirror
     /// appears as small as the whole path is long. MIS weights use the place alone.
     #[inline]
     pub(in crate::transport) fn radius_after(&self, travelled: f32, place: Vec3) -> f32 {
-        self.radius(place).max(self.radius * travelled)
+        self.radius(place).max(self.at_eye + self.radius * travelled)
     }
 
     /// π² r² N: R of a path without vertices in between, for emission with a density of one.

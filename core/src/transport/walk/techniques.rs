@@ -8,7 +8,7 @@ use crate::film::Tile;
 use crate::geometry::Ray;
 use crate::light::{LightSample, emitted};
 use crate::sampling::warp::concentric_disk;
-use crate::scene::{Camera, Projection, SurfacePoint};
+use crate::scene::{Camera, CameraKind, Projection, SurfacePoint};
 use crate::transport::walk::subpath::{Subpath, Vertex, Walk};
 use crate::transport::walk::sums::{
     Counts, End, Sums, weight_of_connection, weight_of_hit, weight_of_light_sample, weight_of_splat,
@@ -261,6 +261,9 @@ impl<F: Features> Walk<'_, F> {
 
 /// The point of the lens from which the camera sees `position` as `seen`.
 pub(crate) fn lens_point(camera: &Camera, lens: [f32; 2], position: Vec3, seen: &Projection) -> Vec3 {
+    if let CameraKind::Orthographic { .. } = camera.kind {
+        return position - seen.distance * seen.direction;
+    }
     if let Some(start) = camera.start {
         // Rays of a far camera start on a plane, because the eye is too far for f32.
         let beyond = seen.distance - start.depth / seen.direction.dot(camera.forward);

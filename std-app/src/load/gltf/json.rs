@@ -98,8 +98,9 @@ objects! {
     BufferView { buffer: usize, byte_offset: u64, byte_length: u64, byte_stride: Option<u64>, }
     Buffer { uri: Option<String>, byte_length: u64, }
     Skin { inverse_bind_matrices: Option<usize>, joints: Vec<usize>, }
-    Camera { name: String, perspective: Option<Perspective>, }
+    Camera { name: String, perspective: Option<Perspective>, orthographic: Option<Orthographic>, }
     Perspective { yfov: f64, }
+    Orthographic { ymag: f64, }
     Light {
         #[serde(rename = "type")] kind: String,
         color: Option<[f64; 3]>,

@@ -7,7 +7,7 @@ use super::{Model, Source, light, mesh};
 use crate::load::error::LoadError;
 use crate::load::obj::Group;
 use crate::load::placed::Placement;
-use crate::load::scene::{NamedCamera, View};
+use crate::load::scene::{NamedCamera, View, ViewKind};
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::HashMap;
 
@@ -265,27 +265,33 @@ fn camera_at(
     source: &mut Source,
 ) -> Option<NamedCamera> {
     let camera = document.cameras.get(number)?;
-    let Some(perspective) = &camera.perspective else {
-        source.note("orthographic cameras are not supported: left out");
-        return None;
-    };
     let eye = placement.offset;
     let along = placement.linear * DVec3::NEG_Z;
     let up = placement.linear * DVec3::Y;
-    let fov_degrees = perspective.yfov.to_degrees();
-    let is_usable = eye.is_finite()
-        && up.is_finite()
-        && along.try_normalize().is_some()
-        && fov_degrees > 0.0
-        && fov_degrees < MOST_FOV;
-    if !is_usable {
-        source.note("camera without a direction or field of view left out");
+    let kind = match (&camera.perspective, &camera.orthographic) {
+        (Some(perspective), _) => {
+            let fov_degrees = perspective.yfov.to_degrees();
+            (fov_degrees > 0.0 && fov_degrees < MOST_FOV).then_some(ViewKind::Perspective { fov_degrees })
+        }
+        (None, Some(orthographic)) => {
+            // `ymag` is half of the height. Exporters write negative ones too.
+            let height = 2.0 * orthographic.ymag.abs() * up.length();
+            (height > 0.0 && height < MOST_HEIGHT).then_some(ViewKind::Orthographic { height })
+        }
+        (None, None) => None,
+    };
+    let is_placed = eye.is_finite() && up.is_finite() && along.try_normalize().is_some();
+    let Some(kind) = kind.filter(|_| is_placed) else {
+        source.note("camera without a direction, field of view or height left out");
         return None;
-    }
+    };
     let name = if node.name.is_empty() { camera.name.clone() } else { node.name.clone() };
     let view = View { eye: eye.into(), look_at: (eye + along.normalize()).into(), up: up.into() };
-    Some(NamedCamera { name, view, fov_degrees })
+    Some(NamedCamera { name, view, kind })
 }
+
+/// Heights of orthographic pictures are smaller.
+const MOST_HEIGHT: f64 = 1e30;
 
 /// Vertical fields of view are smaller, in degrees.
 const MOST_FOV: f64 = 178.0;

@@ -3,11 +3,13 @@
 use super::values::{BRIGHTEST, Colour, Matrix, Rotation};
 use super::{LoadError, Source};
 use crate::load::map::Map;
+use crate::load::texture_set::TextureSet;
 use crate::load::transform::{SceneTransform, direction as direction_between};
+use crate::picture::Picture;
 use crate::values::{ConeAngle, Degrees, Number};
 use glam::{DMat3, Mat3};
 use halflight_core::Rgb;
-use halflight_core::scene::PointLight;
+use halflight_core::scene::{DistantDisc, Environment, PointLight};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -65,7 +67,21 @@ pub struct EnvironmentEntry {
 pub(in crate::load) struct EnvironmentChange {
     pub(in crate::load) radiance: Rgb,
     pub(in crate::load) map: Option<Map>,
+    /// A map that is no file, instead of `map`; its memory is taken.
+    pub(in crate::load) picture: Option<Picture>,
     pub(in crate::load) to_map: Mat3,
+    pub(in crate::load) disc: Option<DistantDisc>,
+}
+
+impl EnvironmentChange {
+    /// The environment, with its map among `textures`.
+    pub(in crate::load) fn in_core(self, textures: &mut TextureSet) -> Environment {
+        let map = match self.picture {
+            Some(picture) => Some(textures.add(picture)),
+            None => textures.colour(self.map.as_ref()),
+        };
+        Environment { radiance: self.radiance, map, to_map: self.to_map, disc: self.disc }
+    }
 }
 
 /// Error of a rotation matrix: files have six or more digits.
@@ -94,7 +110,9 @@ impl EnvironmentEntry {
         Ok(EnvironmentChange {
             radiance: rgb(self.radiance.map_or([1.0; 3], Colour::channels)),
             map,
+            picture: None,
             to_map: to_world.transpose().as_mat3(),
+            disc: None,
         })
     }
 }

@@ -2,16 +2,20 @@
 //! described in `docs/scene-file.md`. Errors have line and column. The error for an unknown key lists the
 //! valid keys.
 
+mod camera;
 mod light;
 mod material;
 mod placement;
+mod sky;
 mod values;
 
+pub use camera::{CameraEntry, KindOfCamera};
 pub(super) use light::EnvironmentChange;
 pub use light::{EnvironmentEntry, LightEntry, LightKind};
 pub(super) use material::MaterialChange;
 pub use material::{MaterialEntry, MaterialKind};
 pub use placement::InstanceEntry;
+pub use sky::SkyEntry;
 pub(super) use values::BRIGHTEST;
 pub use values::{Colour, Factors, Matrix, Reflectance, Rotation};
 
@@ -19,9 +23,9 @@ use super::error::LoadError;
 use super::files::{Found, Lookup};
 use super::map::Map;
 use super::notes::Notes;
-use super::scene::{LoadedScene, RenderSettings, View};
+use super::scene::{LoadedScene, RenderSettings};
 use super::{LoadOptions, SceneBuilder, memory_estimate, read, too_large};
-use crate::values::{FieldOfView, NotNegative, Number, Positive};
+use crate::values::Number;
 use core::cell::RefCell;
 use core::ops::Range;
 use serde::Deserialize;
@@ -46,6 +50,8 @@ pub struct SceneFile {
     pub light: Vec<Spanned<LightEntry>>,
     /// `[environment]`: infinitely distant light.
     pub environment: Option<EnvironmentEntry>,
+    /// `[sky]`: a clear sky with a sun, instead of `[environment]`.
+    pub sky: Option<Spanned<SkyEntry>>,
     /// `[render]`.
     #[serde(default)]
     pub render: RenderSettings,
@@ -74,25 +80,6 @@ pub struct MeshEntry {
     /// True: all placements of the file share its memory. False: each has its own triangles. By default they
     /// share what saves memory.
     pub share: Option<bool>,
-}
-
-/// The camera.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CameraEntry {
-    /// Position.
-    pub eye: [Number; 3],
-    /// A point on the optical axis.
-    pub look_at: [Number; 3],
-    /// Direction that is up in the picture; +y by default.
-    pub up: Option<[Number; 3]>,
-    /// Vertical field of view; 40 degrees by default.
-    pub fov: Option<FieldOfView>,
-    /// Radius of the lens; 0 is a pinhole.
-    #[serde(default)]
-    pub lens_radius: NotNegative,
-    /// Distance of the plane in focus; by default the distance of `look_at`.
-    pub focus_distance: Option<Positive>,
 }
 
 /// Parses a scene file; opens no other file. `file` is for messages only.
@@ -190,7 +177,15 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     }
     let mesh_files: Vec<PathBuf> =
         scene.mesh.iter().map(|mesh| mesh.checked_file(&scene, &source)).collect::<Result<_, _>>()?;
-    let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
+    let environment = match (&scene.environment, &scene.sky) {
+        (Some(_), Some(sky)) => {
+            let problem = "this scene file has a [sky] and an [environment]";
+            return Err(source.error(sky.span(), problem, "leave out one of them"));
+        }
+        (Some(entry), None) => Some(entry.resolved(&source)?),
+        (None, Some(entry)) => Some(sky::environment(entry, &mut builder.budget, &source)?),
+        (None, None) => None,
+    };
     builder.notes = source.notes.take();
     builder.lookup = source.lookup.take();
     for (mesh, file) in scene.mesh.iter().zip(mesh_files) {
@@ -205,7 +200,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
         loaded.lights.push(light::light(light, &transform, &source)?);
     }
     if let Some(camera) = &scene.camera {
-        place_camera(camera, &mut loaded, &source)?;
+        camera::place(camera, &mut loaded, &source)?;
     }
     loaded.settings = scene.render;
     Ok(loaded)
@@ -224,32 +219,4 @@ impl MeshEntry {
             _ => Ok(file),
         }
     }
-}
-
-fn place_camera(
-    entry: &Spanned<CameraEntry>,
-    loaded: &mut LoadedScene,
-    source: &Source,
-) -> Result<(), LoadError> {
-    const DEFAULT_FOV: f64 = 40.0;
-    let camera = entry.get_ref();
-    let up = camera.up.map_or([0.0, 1.0, 0.0], |up| up.map(f64::from));
-    let view = View { eye: camera.eye.map(f64::from), look_at: camera.look_at.map(f64::from), up };
-    let fov = camera.fov.map_or(DEFAULT_FOV, f64::from);
-    let pinhole = loaded.camera_at(view, fov).ok_or_else(|| {
-        source.error(entry.span(), "`eye` and `look_at` are the same point", "move one of them")
-    })?;
-    if camera.up.is_some() && view.looks_along_up() {
-        let problem = "the camera looks along its `up`";
-        return Err(source.error(entry.span(), problem, "give another direction that is up in the picture"));
-    }
-    let camera = loaded
-        .with_lens(pinhole, camera.lens_radius.into(), camera.focus_distance.map(f64::from))
-        .ok_or_else(|| {
-        let problem = "`lens_radius` is more than 1000 times the distance in focus";
-        source.error(entry.span(), problem, "both are lengths in the units of the meshes")
-    })?;
-    loaded.camera = Some(loaded.with_start(camera, view));
-    loaded.view = Some(view);
-    Ok(())
 }

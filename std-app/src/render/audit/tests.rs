@@ -168,7 +168,7 @@ fn shards_are_audited_together() {
     let settings = settings(WRONG, 128, 3, 0.3);
     for (index, film) in films.iter().enumerate() {
         let checkpoint = Some(Checkpoint { path: film.clone(), every: 60.0 });
-        let shard = Shard { index: index as u32, count: 3 };
+        let shard = Shard::part(index as u32, 3);
         picture(Settings { shard, checkpoint, ..settings.clone() });
     }
     let merged = merge(&films).unwrap();

@@ -56,7 +56,7 @@ impl BakeHeader {
         seconds: f64,
     ) -> Self {
         let (decision, error, finished) = renderer.decisions();
-        let Shard { index, count } = renderer.state().shard;
+        let Shard { index, count, .. } = renderer.state().shard;
         Self {
             identity: identity.clone(),
             shard: [index + 1, count],
@@ -94,7 +94,7 @@ impl BakeHeader {
     }
 
     pub(in crate::render) fn shard(&self) -> Shard {
-        Shard { index: self.shard[0].wrapping_sub(1), count: self.shard[1] }
+        Shard::part(self.shard[0].wrapping_sub(1), self.shard[1])
     }
 }
 
@@ -139,7 +139,7 @@ impl Reader {
     /// Opens `path` and reads its header, within `most` bytes.
     pub(in crate::render) fn open(path: &Path, most: usize) -> Result<Self, FileError> {
         let (file, header): (_, BakeHeader) = container::Reader::open(path, &KIND, most)?;
-        let Shard { index, count } = header.shard();
+        let Shard { index, count, .. } = header.shard();
         let has_fractions = [0, header.points].contains(&header.back_faces);
         if index >= count || !(1..=MOST_POINTS).contains(&header.points) || !has_fractions {
             return Err(file.damage("there is no such bake"));

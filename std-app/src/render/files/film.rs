@@ -102,7 +102,7 @@ impl Reader {
     /// Opens `path` and reads its header, within `most` bytes.
     pub(in crate::render) fn open(path: &Path, most: usize) -> Result<Self, FileError> {
         let (file, header): (_, FilmHeader) = container::Reader::open(path, &KIND, most)?;
-        let Shard { index, count } = header.shard();
+        let Shard { index, count, .. } = header.shard();
         let [width, height] = header.size();
         if index >= count || !(1..=MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
             return Err(file.damage("there is no such picture"));

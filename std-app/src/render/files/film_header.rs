@@ -104,7 +104,7 @@ impl FilmHeader {
     }
 
     pub(in crate::render) fn shard(&self) -> Shard {
-        Shard { index: self.shard[0].wrapping_sub(1), count: self.shard[1] }
+        Shard::part(self.shard[0].wrapping_sub(1), self.shard[1])
     }
 
     /// State of the audit, if there is one.

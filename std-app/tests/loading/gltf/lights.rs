@@ -3,7 +3,8 @@
 use super::{Gltf, says};
 use core::f64::consts::FRAC_1_SQRT_2;
 use glam::Vec3;
-use halflight_core::scene::PointLight;
+use halflight::load::ViewKind;
+use halflight_core::scene::{CameraKind, PointLight};
 use serde_json::json;
 
 /// A square with lights, each in a node that is turned from −z to −y, 3 above the square.
@@ -60,7 +61,7 @@ fn senseless_lights_are_limited_or_left_out() {
 fn cameras_are_read_in_the_order_of_the_nodes() {
     let mut file = Gltf::square(json!({}));
     file.json["cameras"] = json!([
-        { "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1, "znear": 0, "zfar": 1 } },
+        { "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1.5, "znear": 0, "zfar": 1 } },
         { "type": "perspective", "name": "wide", "perspective": { "yfov": 1.5, "znear": 1 } },
         { "type": "perspective", "perspective": { "yfov": 9, "znear": 1 } },
     ]);
@@ -72,12 +73,14 @@ fn cameras_are_read_in_the_order_of_the_nodes() {
     }
     file.json["scenes"][0]["nodes"] = json!([0, 1, 2, 3]);
     let scene = file.loaded();
-    let [camera] = &scene.cameras[..] else { panic!("{:?}", scene.cameras) };
-    assert_eq!(
-        (&camera.name[..], camera.view.eye, camera.view.look_at),
-        ("wide", [1., 2., 3.], [1., 2., 2.])
-    );
+    let [parallel, wide] = &scene.cameras[..] else { panic!("{:?}", scene.cameras) };
+    assert_eq!((&wide.name[..], wide.view.eye, wide.view.look_at), ("wide", [1., 2., 3.], [1., 2., 2.]));
+    let kind = ViewKind::Orthographic { height: 3.0 };
+    assert_eq!((parallel.kind, parallel.view), (kind, wide.view));
     let camera = scene.camera.unwrap();
+    let half_height = scene.transform.length(1.5) as f32;
+    assert_eq!(camera.kind, CameraKind::Orthographic { half_height });
+    let camera = scene.camera_of(wide.view, wide.kind).unwrap();
     assert!((camera.tan_half_fov - 0.75f32.tan()).abs() < 1e-6);
-    assert!(says(&scene, &["orthographic"]) && says(&scene, &["without a direction or field of view"]));
+    assert!(says(&scene, &["without a direction, field of view or height"]));
 }

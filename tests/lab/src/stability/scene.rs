@@ -118,8 +118,12 @@ impl TestScene {
         let positions: Vec<[f32; 3]> = self.positions.iter().map(|p| transform.point(*p).into()).collect();
         let mesh = Mesh { positions: &positions, triangles: &self.triangles, ..Mesh::default() };
         let up = if (self.look_at - self.eye).normalize().y.abs() > 0.9 { DVec3::Z } else { DVec3::Y };
-        let sky =
-            |radiance| Environment { radiance: Rgb::splat(radiance), map: None, to_map: Mat3::IDENTITY };
+        let sky = |radiance| Environment {
+            radiance: Rgb::splat(radiance),
+            map: None,
+            to_map: Mat3::IDENTITY,
+            disc: None,
+        };
         let scene = Scene {
             mesh,
             materials: &self.materials,
