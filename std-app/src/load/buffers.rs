@@ -9,6 +9,8 @@ pub(super) struct Geometry {
     pub(super) normals: Vec<[f32; 3]>,
     pub(super) texcoords: Vec<[f32; 2]>,
     pub(super) triangles: Vec<Triangle>,
+    /// Object of each triangle.
+    pub(super) objects: Vec<u32>,
     /// Number of vertices up to the end of each part.
     pub(super) ends: Vec<u32>,
 }

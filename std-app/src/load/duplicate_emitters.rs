@@ -31,6 +31,11 @@ pub(super) fn remove(
     }
     covered.retain(|_, part| *part >= ALL);
     let mut index = 0;
+    geometry.objects.retain(|_| {
+        index += 1;
+        !covered.contains_key(&(index - 1))
+    });
+    index = 0;
     geometry.triangles.retain(|triangle| {
         let is_copy = covered.contains_key(&index);
         if is_copy {

@@ -27,6 +27,7 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
     all.normals.reserve_exact(if with_normals { vertices } else { 0 });
     all.texcoords.reserve_exact(if with_texcoords { vertices } else { 0 });
     all.triangles.reserve_exact(built.iter().map(|(part, _)| part.triangles.len()).sum());
+    all.objects.reserve_exact(all.triangles.capacity());
     for (part, of_part) in built {
         let first = all.positions.len() as u32;
         all.positions.extend(part.positions);
@@ -34,6 +35,7 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
         all.texcoords.extend(part.texcoords);
         let moved = |t: Triangle| Triangle { vertices: t.vertices.map(|v| v + first), ..t };
         all.triangles.extend(part.triangles.into_iter().map(moved));
+        all.objects.extend(part.objects);
         all.ends.push(all.positions.len() as u32);
         notes.merge(of_part);
     }
@@ -101,10 +103,10 @@ impl<'a> Builder<'a> {
 
     /// All usable triangles; large ones are cut if `cut`.
     fn build(mut self, cut: bool) -> (Geometry, Notes) {
-        let Placed { group, placement, material, texcoords } = self.part;
+        let Placed { group, placement, material, texcoords, .. } = self.part;
         let is_mirrored = placement.linear.determinant() < 0.0;
         self.geometry.triangles.reserve_exact(group.triangles.len());
-        for &[a, b, c] in &group.triangles {
+        for (&[a, b, c], object) in group.triangles.iter().zip(self.part.triangle_objects()) {
             // A reflection reverses the winding; reversed again, the front stays the front.
             let vertices = if is_mirrored { [a, c, b] } else { [a, b, c] };
             let corners = vertices.map(|v| self.exact[v as usize]);
@@ -116,6 +118,7 @@ impl<'a> Builder<'a> {
             } else {
                 self.geometry.triangles.push(Triangle { vertices, material: *material });
             }
+            self.geometry.objects.resize(self.geometry.triangles.len(), object);
         }
         let blurred = texcoords::subtract_periods(texcoords, &self.placed_texcoords, &mut self.geometry);
         self.notes.add(blurred, texcoords::BLURRED);
@@ -217,7 +220,7 @@ mod tests {
     }
 
     fn placed(group: &Group, placement: Placement) -> Placed<'_> {
-        Placed { group, placement, material: 0, texcoords: Texcoords::default() }
+        Placed { group, placement, material: 0, texcoords: Texcoords::default(), objects: &[0] }
     }
 
     fn all(group: &Group, placement: Placement) -> (Geometry, Vec<String>) {

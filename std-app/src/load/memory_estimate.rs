@@ -133,6 +133,7 @@ pub(super) fn of_mesh(obj: &Obj) -> usize {
             + size_of_val(&group.normals[..])
             + size_of_val(&group.texcoords[..])
             + size_of_val(&group.triangles[..])
+            + size_of_val(&group.objects[..])
             + size_of::<Group>()
     };
     obj.groups.iter().map(of_group).sum::<usize>() + MATERIAL * obj.materials.len()
@@ -147,9 +148,9 @@ pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
     let of_part = |part: &Placed| {
         let searched = materials.get(part.material as usize).is_some_and(is_searched);
         let of_triangle = match (searched, are_several) {
-            (true, _) => 232,
-            (false, true) => 112,
-            (false, false) => 32,
+            (true, _) => 240,
+            (false, true) => 120,
+            (false, false) => 40,
         };
         96 * part.group.positions.len() + of_triangle * part.group.triangles.len()
     };

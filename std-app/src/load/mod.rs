@@ -24,6 +24,7 @@ pub mod mtl;
 mod name;
 mod notes;
 pub mod obj;
+mod objects;
 mod open_glass;
 mod overlaps;
 mod parts;
@@ -51,13 +52,13 @@ pub use texture_set::TextureSet;
 pub use transform::{SceneTransform, direction};
 
 use crate::memory::{self, Budget, Shortage};
-use core::ops::Range;
 use files::Lookup;
 use halflight_core::scene::{Environment, Material};
 use library::{Library, Sources};
 use models::ReadModel;
 use mtl::MtlMaterial;
 use name::readings;
+use objects::Objects;
 use placed::{Placed, PlacedMesh, Placement};
 use placed_light::PlacedLight;
 use scene_file::{EnvironmentChange, MaterialChange};
@@ -292,17 +293,6 @@ impl SceneBuilder {
         Ok(set)
     }
 
-    /// Names and vertices of the meshes, whose parts have these ends.
-    fn meshes(&self, ends: &[u32]) -> Vec<(String, Range<u32>)> {
-        let (mut parts, mut first) = (0, 0);
-        let range = |mesh: &PlacedMesh| {
-            parts += self.objs[mesh.obj].groups.len();
-            let end = ends[..parts].last().copied().unwrap_or_default();
-            (mesh.name.clone(), core::mem::replace(&mut first, end)..end)
-        };
-        self.meshes.iter().map(range).collect()
-    }
-
     /// The scene with the buffers of the core.
     fn build(
         mut self,
@@ -337,12 +327,13 @@ impl SceneBuilder {
         let derived = textures.derived_bytes();
         self.budget.take(derived).map_err(|why| too_large(path, &why))?;
 
+        let objects = Objects::of(&self.meshes, &self.objs);
         let mut parts = Vec::new();
-        for mesh in &self.meshes {
+        for (mesh, objects) in self.meshes.iter().zip(&objects.of_meshes) {
             for group in &self.objs[mesh.obj].groups {
                 let material = mesh.materials[group.material.unwrap_or(mesh.materials.len() - 1)];
                 let texcoords = texcoords[material as usize];
-                parts.push(Placed { group, placement: mesh.placement, material, texcoords });
+                parts.push(Placed { group, placement: mesh.placement, material, texcoords, objects });
             }
         }
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
@@ -370,7 +361,9 @@ impl SceneBuilder {
             overlaps: overlaps::both_orders(&overlaps),
             materials,
             material_names: names,
-            meshes: self.meshes(&geometry.ends),
+            meshes: objects::meshes(&self.meshes, &self.objs, &geometry.ends),
+            object_names: objects.names,
+            triangle_objects: geometry.objects,
             textures,
             lights,
             environment,

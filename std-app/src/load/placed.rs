@@ -61,6 +61,23 @@ pub(super) struct Placed<'a> {
     /// Index into the materials of the scene.
     pub(super) material: u32,
     pub(super) texcoords: Texcoords,
+    /// Index into the objects of the scene for each object of the OBJ, and last for faces without object.
+    pub(super) objects: &'a [u32],
+}
+
+impl Placed<'_> {
+    /// Object of each triangle of the group.
+    pub(super) fn triangle_objects(&self) -> impl Iterator<Item = u32> {
+        let of_mesh = self.objects.last().copied().unwrap_or_default();
+        let mut runs = self.group.objects.iter().peekable();
+        let mut object = of_mesh;
+        (0..self.group.triangles.len()).map(move |triangle| {
+            while let Some(run) = runs.next_if(|run| run.first <= triangle) {
+                object = run.object.map_or(of_mesh, |object| self.objects[object]);
+            }
+            object
+        })
+    }
 }
 
 /// Bounding box of all finite vertices; infinite and inverted if there are none.

@@ -32,6 +32,11 @@ pub struct LoadedScene {
     pub material_names: Vec<String>,
     /// Names of the meshes, files without their extensions, and their vertices.
     pub meshes: Vec<(String, Range<u32>)>,
+    /// Names of the objects, all different: `o` or `g` of OBJ files, nodes of glTF files, meshes of
+    /// [`super::SceneParts`]; of faces without one, the file without its extension. Copies have a number.
+    pub object_names: Vec<String>,
+    /// Object of each triangle.
+    pub triangle_objects: Vec<u32>,
     /// Textures of the materials and the environment.
     pub textures: TextureSet,
     /// Lights without surface.

@@ -56,7 +56,7 @@ objects! {
     }
     OfNode { #[serde(rename = "KHR_lights_punctual")] light: Option<LightOfNode>, }
     LightOfNode { light: usize, }
-    Mesh { primitives: Vec<Primitive>, weights: Vec<f64>, }
+    Mesh { name: String, primitives: Vec<Primitive>, weights: Vec<f64>, }
     Primitive {
         attributes: Attributes,
         indices: Option<usize>,

@@ -75,6 +75,7 @@ pub(super) fn group(
             used.par_iter().map(|&v| texcoords.placed(DVec2::from(rows.row(v as usize))).into()).collect()
         }),
         triangles,
+        objects: Vec::new(),
     }))
 }
 

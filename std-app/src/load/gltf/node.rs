@@ -154,7 +154,12 @@ impl Builder<'_> {
         source.take(PART * (1 + self.model.meshes[index].len()))?;
         // Joints place a mesh in the world.
         let placement = if skin.is_some() { Placement::IDENTITY } else { placement };
-        self.model.instances.push((node.name.clone(), index, placement));
+        let of_mesh = self.buffers.document.meshes.get(number).map_or("", |mesh| &mesh.name);
+        let name = match (&node.name[..], of_mesh) {
+            ("", "") => format!("mesh {number}"),
+            ("", name) | (name, _) => name.to_owned(),
+        };
+        self.model.instances.push((name, index, placement));
         Ok(())
     }
 

@@ -25,6 +25,26 @@ pub(super) struct Run {
     pub(super) material: Option<Name>,
     /// `f` statements.
     pub(super) faces: Vec<u8>,
+    /// Faces by the object that they belong to.
+    pub(super) sections: Vec<Section>,
+}
+
+/// Faces after an `o` or `g` statement.
+#[derive(Debug, Default)]
+pub(super) struct Section {
+    /// `None` continues the section before.
+    pub(super) start: Option<SectionStart>,
+    /// Number of faces.
+    pub(super) faces: usize,
+}
+
+/// Statement that begins a section.
+#[derive(Debug)]
+pub(super) enum SectionStart {
+    /// `o`.
+    Object(Name),
+    /// `g`.
+    Group(Name),
 }
 
 /// A clean piece.
@@ -102,22 +122,32 @@ impl Cleaner<'_> {
             b"usemtl" => {
                 let material = Some(operands.rest().into());
                 let runs = &mut self.piece.runs;
-                runs.pop_if(|run| run.faces.is_empty());
-                if runs.last().is_none_or(|run| run.material != material) {
-                    runs.push(Run { material, ..Run::default() });
+                let sections = runs.pop_if(|run| run.faces.is_empty()).unwrap_or_default().sections;
+                match runs.last_mut() {
+                    Some(run) if run.material == material => run.sections.extend(sections),
+                    _ => runs.push(Run { material, sections, ..Run::default() }),
                 }
             }
+            b"o" => self.section(SectionStart::Object(operands.rest().into())),
+            b"g" => self.section(SectionStart::Group(operands.rest().into())),
             b"mtllib" => self.piece.libraries.push((number, operands.rest().into())),
             other => self.other(number, other),
         }
         Ok(())
     }
 
+    fn section(&mut self, start: SectionStart) {
+        let section = Section { start: Some(start), faces: 0 };
+        if let Some(run) = self.piece.runs.last_mut() {
+            run.sections.push(section);
+        }
+    }
+
     /// Statements without a surface.
     #[cold]
     fn other(&mut self, number: u32, keyword: &[u8]) {
         let what = match keyword {
-            b"o" | b"g" | b"s" | b"usemap" | b"maplib" | b"lod" | b"mg" | b"bevel" => return,
+            b"s" | b"usemap" | b"maplib" | b"lod" | b"mg" | b"bevel" => return,
             b"l" | b"p" => "points and lines have no surface: left out",
             b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
             | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" => {
@@ -190,7 +220,7 @@ impl Cleaner<'_> {
     #[inline]
     fn face(&mut self, line: u32, operands: Words) -> Result<(), LoadError> {
         let Self { indices, corners, piece: Piece { runs, notes, .. } } = self;
-        let Some(Run { faces, .. }) = runs.last_mut() else { return Ok(()) };
+        let Some(Run { faces, sections, .. }) = runs.last_mut() else { return Ok(()) };
         corners.clear();
         for word in operands {
             corners.push(indices.corner(line, word)?);
@@ -207,6 +237,10 @@ impl Cleaner<'_> {
         if (1..corners.len()).contains(&without_normal) {
             notes.at(line, "face with a normal in only some corners is shaded flat");
             corners.iter_mut().for_each(|corner| corner[NORMAL] = ABSENT);
+        }
+        match sections.last_mut() {
+            Some(section) => section.faces += 1,
+            None => sections.push(Section { start: None, faces: 1 }),
         }
         faces.push(b'f');
         corners.iter().for_each(|corner| write_corner(faces, *corner, indices.total));

@@ -6,6 +6,7 @@
 mod clean;
 mod feed;
 mod polygon;
+mod sections;
 
 use super::error::LoadError;
 use super::name::Name;
@@ -13,6 +14,7 @@ use super::notes::Notes;
 use super::text::{self, Binary};
 use clean::{Counts, Piece};
 use rayon::prelude::*;
+pub(super) use sections::ObjectRun;
 use std::path::Path;
 
 /// Bytes of a piece: small enough to give each thread some of a file of middle size.
@@ -25,6 +27,8 @@ pub struct Obj {
     pub groups: Vec<Group>,
     /// Operands of the `usemtl` statements in use, in the order of their first use.
     pub materials: Vec<Name>,
+    /// Operands of the `o` statements in use, or of `g` if there is no `o`, in the order of their first use.
+    pub objects: Vec<Name>,
     /// `mtllib` statements: line and operand.
     pub libraries: Vec<(u32, Name)>,
     /// Repairs.
@@ -44,6 +48,8 @@ pub struct Group {
     pub texcoords: Vec<[f64; 2]>,
     /// Counter-clockwise; every index is in range.
     pub triangles: Vec<[u32; 3]>,
+    /// Objects of the triangles; empty if none has one.
+    pub(super) objects: Vec<ObjectRun>,
 }
 
 /// Reads the bytes of an OBJ file. `file` is for messages only; no other file is opened.

@@ -11,27 +11,28 @@ const MOST_CORNERS: usize = 1 << 13;
 /// Relative difference of areas up to which triangles cover a polygon: their sum is rounded.
 const ROUNDING: f64 = 1e-9;
 
-/// Triangles of consecutive faces. `arities`: number of corners of each face; empty if all are triangles.
+/// Adds the triangles of consecutive faces. `arities`: number of corners of each face; empty if all are
+/// triangles.
 pub(super) fn triangulate(
     positions: &[[f64; 3]],
     indices: &[u32],
     arities: &[u32],
+    triangles: &mut Vec<[u32; 3]>,
     notes: &mut Notes,
-) -> Vec<[u32; 3]> {
+) {
     if arities.is_empty() {
-        return indices.as_chunks().0.to_vec();
+        return triangles.extend_from_slice(indices.as_chunks().0);
     }
-    let mut triangles = Vec::with_capacity(indices.len() - 2 * arities.len());
+    triangles.reserve(indices.len() - 2 * arities.len());
     let mut rest = indices;
     for &arity in arities {
         let (face, later) = rest.split_at(arity as usize);
         rest = later;
         match *face {
             [a, b, c] => triangles.push([a, b, c]),
-            _ => polygon(positions, face, &mut triangles, notes),
+            _ => polygon(positions, face, triangles, notes),
         }
     }
-    triangles
 }
 
 fn polygon(positions: &[[f64; 3]], face: &[u32], triangles: &mut Vec<[u32; 3]>, notes: &mut Notes) {
@@ -103,10 +104,21 @@ fn fan_area(points: &[[f64; 2]]) -> f64 {
 mod tests {
     use super::*;
 
+    fn triangles_of(
+        positions: &[[f64; 3]],
+        indices: &[u32],
+        arities: &[u32],
+        notes: &mut Notes,
+    ) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::new();
+        triangulate(positions, indices, arities, &mut triangles, notes);
+        triangles
+    }
+
     fn cut(corners: &[[f64; 3]]) -> (Vec<[u32; 3]>, f64, Vec<String>) {
         let mut notes = Notes::default();
         let indices: Vec<u32> = (0..corners.len() as u32).collect();
-        let triangles = triangulate(corners, &indices, &[corners.len() as u32], &mut notes);
+        let triangles = triangles_of(corners, &indices, &[corners.len() as u32], &mut notes);
         let flat = flatten(corners);
         let areas = triangles
             .iter()
@@ -170,9 +182,9 @@ mod tests {
         assert_eq!(cut(&point).2, ["polygon without area left out"]);
         let mut notes = Notes::default();
         let bad = [[0., 0., 0.], [f64::NAN, 0., 0.], [1., 1., 0.], [0., 1., 0.]];
-        assert!(triangulate(&bad, &[0, 1, 2, 3], &[4], &mut notes).is_empty());
+        assert!(triangles_of(&bad, &[0, 1, 2, 3], &[4], &mut notes).is_empty());
         let bow = [[0., 0., 0.], [1., 1., 0.], [1., 0., 0.], [0., 1., 0.]];
-        triangulate(&bow, &[0, 1, 2, 3], &[4], &mut notes);
+        triangles_of(&bow, &[0, 1, 2, 3], &[4], &mut notes);
     }
 
     #[test]
@@ -191,9 +203,9 @@ mod tests {
         let star: Vec<_> = (0..count - 1).map(|i| circle(i * (count / 2 - 1) % (count - 1), 1.0)).collect();
         let mut notes = Notes::default();
         let corners: Vec<u32> = (0..count as u32 - 1).collect();
-        triangulate(&star, &corners, &[count as u32 - 1], &mut notes);
+        triangles_of(&star, &corners, &[count as u32 - 1], &mut notes);
         assert_eq!(notes.sentences(), ["polygon that crosses itself is cut as well as it can be"]);
         let wild: Vec<_> = (0..count).map(|i| circle(i * i * 7919 % count, (i % 97) as f64)).collect();
-        triangulate(&wild, &(0..count as u32).collect::<Vec<_>>(), &[count as u32], &mut notes);
+        triangles_of(&wild, &(0..count as u32).collect::<Vec<_>>(), &[count as u32], &mut notes);
     }
 }
