@@ -17,8 +17,7 @@ import workbench
 from workbench import np
 
 # -aa, -ad, -as, -ar. Without interpolation the other two are of no use.
-SWEEP = [(0, 64, 0, 0), (0, 256, 0, 0), (0, 1024, 0, 0), (0.3, 512, 128, 64), (0.2, 512, 128, 64), (0.2, 1024, 256, 128)]
-SWEEP += [(0.15, 1024, 256, 256), (0.1, 2048, 512, 256)]
+SWEEP = [(0, 64, 0, 0), (0, 256, 0, 0), (0, 1024, 0, 0), (0.5, 256, 64, 32), (0.3, 512, 128, 64), (0.2, 512, 128, 64)]
 SAMPLES = (16, 64, 256, 1024)
 LIMITS = ["-ab", 12, "-lr", 12, "-lw", 0, "-dj", 1, "-ds", 0.05, "-dt", 0, "-dc", 1, "-u+"]
 # The half-width of a 95 % interval by a bake, in standard errors.
@@ -84,7 +83,7 @@ def compare(name, arguments, program, folder):
         error, mean = np.sqrt(max(square, 0.0)), values[lit].mean() / truth[lit].mean()
         print(f"| {who} | {settings} | {error:.4f} | {mean:.4f} | {seconds:.2f} |", flush=True)
 
-    for settings in SWEEP:
+    for settings in SWEEP[: arguments.sweep]:
         note("rtrace", "-aa {} -ad {} -as {} -ar {}".format(*settings), *rtrace(folder, name, points, *settings))
     for spp in SAMPLES:
         values, _, seconds = bake(program, name, points, spp, 1)
@@ -96,6 +95,7 @@ def main():
     parser.add_argument("scenes", nargs="*", default=["cornell", "two-rooms"])
     parser.add_argument("--sensors", type=int, default=500)
     parser.add_argument("--divisions", type=int, default=4096, help="rays of a sensor of rtrace")
+    parser.add_argument("--sweep", type=int, default=len(SWEEP), help="only so many settings of rtrace")
     parser.add_argument("--reference-spp", type=int, default=REFERENCE_SPP)
     arguments = parser.parse_args()
     program, folder = workbench.halflight_program(), radiance.programs()

@@ -25,6 +25,12 @@ use crate::transport::{
 /// Work of the audit, relative to that of the samples.
 const AUDIT: f64 = 0.2;
 
+/// Work of filling one of both caches, relative to that of the bake, above which it is left to paths: a part of
+/// the predicted ratio of squared errors, so that little is lost where little is to be gained, and its most
+/// (docs/decisions/point-caches.md#work-of-filling).
+const FILLING_OF_GAIN: f64 = 0.05;
+const MOST_FILLING: f64 = 0.5;
+
 const SETTINGS: CacheSettings = CacheSettings {
     metric: Metric::Halflight,
     error: CacheResolution::COARSEST.error,
@@ -42,6 +48,8 @@ const SETTINGS: CacheSettings = CacheSettings {
 pub struct PointPrediction {
     /// Film of the cache.
     picture: CachedPicture,
+    /// Records of a cache from which on its filling takes too much of the work.
+    records: f64,
     /// Squared relative error by path tracing, and by the cache.
     errors: [f64; 2],
     /// Limits beyond which path tracing is better.
@@ -99,7 +107,9 @@ impl PointPrediction {
             bias: if rays.is_finite() { largest.unwrap_or(0.0).max(errors[0]) } else { f64::INFINITY },
             samples: within.map_or(f64::INFINITY, |within| 0.5 * within / (count * work)),
         };
-        Ok(Some(Self { picture, errors, limits }))
+        let of_record = work * f64::from(CacheResolution::COARSEST.strata.pow(2));
+        let filling = (FILLING_OF_GAIN * errors[0] / errors[1]).min(MOST_FILLING);
+        Ok(Some(Self { picture, records: filling * rays / of_record, errors, limits }))
     }
 
     /// True if the cache is predicted to have less error.
@@ -145,6 +155,8 @@ fn pilot_of<F: Features, E: LightEstimator<F>>(
 /// Irradiance cache of points.
 pub struct CachedPoints<'a, F> {
     caching: IrradianceCaching<'a, F>,
+    /// True if its size follows from the work.
+    is_limited: bool,
 }
 
 impl<'a, F: Features> CachedPoints<'a, F> {
@@ -160,30 +172,38 @@ impl<'a, F: Features> CachedPoints<'a, F> {
         SETTINGS.gathering_footprint().and(records).and(records)
     }
 
-    /// An empty cache for `points` along a curve; `None` where all are in one position.
+    /// An empty cache for `points` along a curve, which `is_limited` in size by its work; `None` where all are
+    /// in one position.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `memory` has less than the tables need.
     pub fn new(
         context: &RenderContext<'a>,
         points: &'a [IrradiancePoint],
-        prediction: &PointPrediction,
+        (prediction, is_limited): (&PointPrediction, bool),
         memory: &mut impl MemorySource<'a>,
     ) -> Result<Option<Self>, OutOfMemory> {
         let Some(step) = median_step(points) else { return Ok(None) };
-        let settings = CacheSettings { picture: Some(prediction.picture), ..SETTINGS };
+        let usual = SETTINGS.records(points.len()) as f64;
+        let records = is_limited.then(|| prediction.records.clamp(1.0, usual) as u32);
+        let settings = CacheSettings { picture: Some(prediction.picture), records, ..SETTINGS };
         let caching = IrradianceCaching::new(context, &settings, memory)?;
-        Ok(Some(Self { caching: caching.for_points(PointPlaces::new(points, step)) }))
+        Ok(Some(Self { caching: caching.for_points(PointPlaces::new(points, step)), is_limited }))
     }
 
-    /// Fills both caches, or continues to. Returns whether they are complete.
+    /// True if the scene needs more records than pay.
+    pub fn is_too_small(&self) -> bool {
+        self.is_limited && self.caching.caches().iter().any(|cache| cache.is_full())
+    }
+
+    /// Fills both caches, or continues to, unless they are too small. Returns whether they are complete.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the scratch of the executor is too small.
     pub fn fill<E: Executor>(&mut self, round: &mut Round<E>) -> Result<bool, OutOfMemory> {
         if !self.caching.is_frozen() {
             for number in 0..FILLED {
-                if !self.caching.fill(number, None, round)? {
+                if !self.caching.fill(number, None, round)? || self.is_too_small() {
                     return Ok(false);
                 }
             }

@@ -135,7 +135,10 @@ impl<'a, F: Features> IrradiancePoints<'a, F> {
             method == PointMethod::IrradianceCache || prediction.prefers_cache()
         };
         match self.prediction.filter(prefers) {
-            Some(prediction) => self.cache = CachedPoints::new(context, points, &prediction, memory)?,
+            Some(ref prediction) => {
+                let is_limited = method == PointMethod::Auto;
+                self.cache = CachedPoints::new(context, points, (prediction, is_limited), memory)?;
+            }
             None => self.without_cache = Some("paths have less predicted error"),
         }
         Ok(self)
@@ -147,7 +150,7 @@ impl<'a, F: Features> IrradiancePoints<'a, F> {
         self.prediction.map(|prediction| prediction.limits)
     }
 
-    /// Path traces all points from now on.
+    /// Path traces all points from now on, since records have too much error.
     pub fn leave_cache(&mut self) {
         (self.cache, self.without_cache) = (None, Some("records have more error than paths"));
     }
@@ -170,13 +173,16 @@ impl<'a, F: Features> IrradiancePoints<'a, F> {
         round: &mut Round<E>,
         is_open: impl Fn(usize) -> bool + Copy + Send,
     ) -> Result<(), OutOfMemory> {
-        let Self { integrator, points, part, photons, cache, .. } = self;
-        if let Some(cache) = cache {
-            return match cache.fill(round)? {
-                true => sample(&cache.paths(), (points, *part), round, (u32::MAX, is_open)),
-                false => Ok(()),
-            };
+        if let Some(cache) = &mut self.cache {
+            if cache.fill(round)? {
+                return sample(&cache.paths(), (self.points, self.part), round, (u32::MAX, is_open));
+            }
+            if !cache.is_too_small() {
+                return Ok(());
+            }
+            (self.cache, self.without_cache) = (None, Some("records would take too much of the work"));
         }
+        let Self { integrator, points, part, photons, .. } = self;
         let Some(photons) = photons else {
             return sample(integrator, (points, *part), round, (u32::MAX, is_open));
         };

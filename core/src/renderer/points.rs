@@ -319,6 +319,9 @@ impl<'a> IrradianceRenderer<'a> {
         let round = &mut Round { executor, state: &mut film.state, target, step: STEP };
         of_build!(build, method => {
             method.sample(round, |tile| is_open(finished, tile))?;
+            if method.limits_of_cache().is_none() {
+                *audit = None;
+            }
             match audit {
                 Some(audit) => audit.sample(method, round.executor, (target, STEP)),
                 None => Ok(()),
