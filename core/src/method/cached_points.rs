@@ -25,9 +25,9 @@ use crate::transport::{
 /// Work of the audit, relative to that of the samples.
 const AUDIT: f64 = 0.2;
 
-/// Work of filling one of both caches, relative to that of the bake, above which it is left to paths: a part of
-/// the predicted ratio of squared errors, so that little is lost where little is to be gained, and its most
-/// (docs/decisions/point-caches.md#work-of-filling).
+/// Work of filling one of both caches, relative to that of the bake, above which paths take its place: a part
+/// of the predicted ratio of squared errors, so that little is lost where little is to be gained, and its
+/// most (docs/decisions/point-caches.md#work-of-filling).
 const FILLING_OF_GAIN: f64 = 0.05;
 const MOST_FILLING: f64 = 0.5;
 
@@ -172,8 +172,8 @@ impl<'a, F: Features> CachedPoints<'a, F> {
         SETTINGS.gathering_footprint().and(records).and(records)
     }
 
-    /// An empty cache for `points` along a curve, which `is_limited` in size by its work; `None` where all are
-    /// in one position.
+    /// An empty cache for `points` along a curve, which `is_limited` in size by its work; `None` where all
+    /// are in one position.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `memory` has less than the tables need.

@@ -3,23 +3,23 @@
 mod audit;
 mod film;
 mod layout;
+mod memory;
+mod structures;
 mod value;
 
 pub use film::PointFilm;
 pub use value::{PointIrradiance, PointSettings};
 
 use super::build::{Build, build_for, of_build};
-use super::{RenderError, RequiredMemory, Until};
+use super::{RenderError, Until};
 use crate::bsdf::{All, DiffuseTextured, Opaque};
 use crate::bvh::Bvh;
 use crate::film::{Dropped, PIXELS_PER_TILE, Pixel};
 use crate::findings::Findings;
 use crate::light::{LightSampler, luminance};
-use crate::memory::{Arena, Buffer, Footprint, OutOfMemory};
-use crate::method::cached_points::CachedPoints;
+use crate::memory::{Arena, Buffer, OutOfMemory};
 use crate::method::{
-    Executor, IrradiancePoints, PilotSize, PointMethod, RenderContext, RenderState, Round, Shard,
-    WantedIrradiance,
+    Executor, IrradiancePoints, PilotSize, PointMethod, RenderContext, RenderState, Round, WantedIrradiance,
 };
 use crate::scene::Scene;
 use crate::transport::{Counters, IrradiancePoint, PathSettings, UNLIMITED};
@@ -27,6 +27,7 @@ use audit::{Bias, PointAudit};
 use film::OFFSET;
 use layout::{Layout, number_of, order_along_curve};
 use libm::{ceil, fmin, sqrt};
+use structures::{method_of, structures};
 
 /// Samples of a tile between two questions whether the executor is over.
 const STEP: u32 = 16;
@@ -65,19 +66,6 @@ pub struct IrradianceRenderer<'a> {
 }
 
 impl<'a> IrradianceRenderer<'a> {
-    /// Memory for so many points in `scene` by path tracing, before anything is built.
-    pub fn required_memory(scene: &Scene, points: usize) -> RequiredMemory {
-        Self::required_memory_by(scene, points, PointMethod::Path)
-    }
-
-    /// The same by another method. With less the bake has no cache.
-    pub fn required_memory_by(scene: &Scene, points: usize, method: PointMethod) -> RequiredMemory {
-        let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
-        let own = Self::footprint(scene, points, method);
-        let structures = Bvh::footprint(scene.mesh.triangles.len()).and(lights).and(own);
-        RequiredMemory { structures: structures.bytes(), scratch: Self::scratch().bytes() }
-    }
-
     /// Builds the hierarchy and the lights of `scene`, whose camera is of no matter. Points that lie on a
     /// surface within rounding are put on it, on the side of their normals.
     ///
@@ -100,19 +88,6 @@ impl<'a> IrradianceRenderer<'a> {
         let bvh = Bvh::build_with(&scene.mesh, arena, settings.level, executor.fork())?;
         let lights = LightSampler::build(scene, arena)?.with_level(settings.level);
         Self::over((scene, bvh, lights), points, settings, arena, executor)
-    }
-
-    /// Working memory of a worker.
-    #[doc(hidden)]
-    pub fn scratch() -> Footprint {
-        IrradiancePoints::<All>::scratch()
-    }
-
-    /// Memory of the points and their photons alone, beside structures of the scene that exist.
-    #[doc(hidden)]
-    pub fn footprint(scene: &Scene, points: usize, method: PointMethod) -> Footprint {
-        let layout = Layout::of(points);
-        layout.footprint().and(structures(scene, &layout, method)).and(of_audit(&layout, method))
     }
 
     /// As [`IrradianceRenderer::new`], over structures of the scene that exist.
@@ -398,31 +373,6 @@ fn check_number(points: &[IrradiancePoint]) -> Result<(), RenderError> {
     match (1..=MOST_POINTS).contains(&points.len()) {
         true => Ok(()),
         false => Err(RenderError::Points),
-    }
-}
-
-/// The method of `settings`: parts of a bake and replicates of few points have no cache.
-fn method_of(settings: &PointSettings, layout: &Layout) -> PointMethod {
-    match settings.shard == Shard::WHOLE && layout.replicates == 1 {
-        true => settings.method,
-        false => PointMethod::Path,
-    }
-}
-
-/// Memory of photons and of a cache.
-fn structures(scene: &Scene, layout: &Layout, method: PointMethod) -> Footprint {
-    let photons = IrradiancePoints::<All>::footprint(scene, layout.pixels());
-    match method {
-        PointMethod::Path => photons,
-        _ => photons.and(CachedPoints::<All>::footprint(layout.pixels())),
-    }
-}
-
-/// Memory of an audit.
-fn of_audit(layout: &Layout, method: PointMethod) -> Footprint {
-    match method {
-        PointMethod::Path => Footprint::default(),
-        _ => PointAudit::footprint(layout),
     }
 }
 

@@ -108,8 +108,8 @@ impl<'a> PointAudit<'a> {
     }
 }
 
-/// Squared bias of the luminance of a pixel over the square of its value and of `offset`, by the halves of its
-/// `truth`; `None` if a half has no sample.
+/// Squared bias of the luminance of a pixel over the square of its value and of `offset`, by the halves of
+/// its `truth`; `None` if a half has no sample.
 fn bias_of(pixel: &Pixel, truth: &Pixel, offset: f64) -> Option<f64> {
     let halves = [&pixel.even, &pixel.odd, &truth.even, &truth.odd];
     if halves.iter().any(|half| half.count() == 0) {
