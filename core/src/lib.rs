@@ -124,7 +124,8 @@ pub use memory::{Arena, Line};
 pub use method::choice::Goal;
 pub use method::{
     BidirectionalSettings, CacheOptions, Executor, LobeSettings, Loop, Method, MethodKind,
-    MetropolisSettings, Passed, PathOptions, PhotonSettings, Shard, VirtualLightSettings, Worker,
+    MetropolisSettings, Passed, PathOptions, PhotonSettings, PointMethod, Shard, VirtualLightSettings,
+    Worker,
 };
 pub use renderer::{
     IrradianceRenderer, PointIrradiance, PointSettings, RenderError, Renderer, RequiredMemory, Settings,

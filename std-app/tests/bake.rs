@@ -207,3 +207,68 @@ fn the_owner_of_a_scene_bakes_what_a_build_of_its_own_does() {
     // A single point has 64 replicates.
     assert_eq!(alone.values[0].samples, 16 * 64);
 }
+
+/// A closed room of side 2 with a lamp below its ceiling, and 1,000 sensors on its floor.
+fn room(name: &str) -> Folder {
+    let folder = Folder::new(name);
+    let walls = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 2 -1\nv -1 2 1\nv 1 2 1\nv 1 2 -1\n\
+                 v -0.3 1.9 -0.3\nv 0.3 1.9 -0.3\nv 0.3 1.9 0.3\nv -0.3 1.9 0.3\n\
+                 usemtl wall\nf 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n\
+                 usemtl lamp\nf 9 10 11 12\n";
+    std::fs::write(folder.path("room.obj"), format!("mtllib room.mtl\n{walls}")).unwrap();
+    let materials = "newmtl wall\nKd 0.7 0.7 0.7\nnewmtl lamp\nKd 0 0 0\nKe 5 5 5\n";
+    std::fs::write(folder.path("room.mtl"), materials).unwrap();
+    let at = |i: u32, count: u32| 1.9 * (f64::from(i) + 0.5) / f64::from(count) - 0.95;
+    let grid: String =
+        (0..1000).map(|i| format!("{} 0 {} 0 1 0\n", at(i % 40, 40), at(i / 40, 25))).collect();
+    std::fs::write(folder.path("grid.pts"), grid).unwrap();
+    folder
+}
+
+#[test]
+fn a_cache_has_the_light_of_paths_within_its_intervals() {
+    let folder = room("bake-cache");
+    let bake = "bake room.obj --points grid.pts --json";
+    folder.object(&format!("{bake} --spp 1024 -o paths.csv"));
+    let cached = |threads: u32| {
+        let name = format!("cache-{threads}.csv");
+        let command = format!("{bake} --method irradiance-cache --spp 64 --threads {threads} -o {name}");
+        let findings = folder.object(&command)["findings"].clone();
+        assert_eq!(findings["irradiance_cache"]["decision"], "used", "{findings}");
+        assert!(findings["audit"]["bias"].as_f64().unwrap() < 0.05, "{findings}");
+        std::fs::read(folder.path(&name)).unwrap()
+    };
+    let table = cached(1);
+    assert_eq!(table, cached(3));
+    let (paths, cache) = (rows(&std::fs::read(folder.path("paths.csv")).unwrap()), rows(&table));
+    let mean = |rows: &[Vec<f64>]| rows.iter().map(|row| row[9]).sum::<f64>() / rows.len() as f64;
+    assert!((mean(&cache) / mean(&paths) - 1.0).abs() < 0.01, "{} {}", mean(&cache), mean(&paths));
+    // Noise of the paths is in neither interval; joint ones are wider.
+    let holds = |(cache, paths): &(&Vec<f64>, &Vec<f64>)| {
+        let joint = (cache[11] - cache[9]).hypot(paths[11] - paths[9]);
+        (cache[9] - paths[9]).abs() <= joint
+    };
+    let held = cache.iter().zip(&paths).filter(holds).count();
+    assert!(held > 900, "{held}");
+    let width = |rows: &[Vec<f64>]| rows.iter().map(|row| row[11] - row[9]).sum::<f64>();
+    folder.object(&format!("{bake} --spp 64 -o few.csv"));
+    let few = rows(&std::fs::read(folder.path("few.csv")).unwrap());
+    assert!(width(&cache) < 0.7 * width(&few), "{} {}", width(&cache), width(&few));
+}
+
+#[test]
+fn a_cache_is_chosen_where_it_is_predicted_to_have_less_error() {
+    let folder = room("bake-cache-auto");
+    // So few rays cannot fill a cache.
+    let bake = "bake room.obj --points grid.pts --method auto --json";
+    let object = folder.object(&format!("{bake} --spp 2 -o few.csv"));
+    assert_eq!(object["findings"]["irradiance_cache"]["decision"], "left out", "{object}");
+    let few = std::fs::read(folder.path("few.csv")).unwrap();
+    folder.object("bake room.obj --points grid.pts --spp 2 -o paths.csv --json");
+    assert_eq!(few, std::fs::read(folder.path("paths.csv")).unwrap());
+    let object = folder.object(&format!("{bake} --error 0.02 -o many.csv"));
+    assert_eq!(object["findings"]["irradiance_cache"]["decision"], "used", "{object}");
+    assert_eq!(object["tiles"], object["within_error"], "{object}");
+    let said = folder.refused(&format!("{bake} --spp 4 --checkpoint a.bake"));
+    assert!(said.contains("--checkpoint"), "{said}");
+}

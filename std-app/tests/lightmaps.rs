@@ -277,7 +277,7 @@ fn maps_that_cannot_be_are_refused_before_the_work() {
         ),
         ("scene.obj --lightmap all --size 8x8 -o a.png", "a.png: a PNG has no room for light"),
         ("scene.obj --lightmap all --size 8x8 --directional -o a.hdr", "an HDR has no negative values"),
-        ("scene.obj --lightmap wall --size 8x8 -o a.exr", "no mesh or material is called `wall`"),
+        ("scene.obj --lightmap wall --size 8x8 -o a.exr", "no mesh, object or material is called `wall`"),
         ("scene.obj --lightmap all --size 16384x16384 -o a.exr --memory 1G", "the lightmap is too large"),
         ("scene.obj --lightmap all --size 16384x16384 -o a.exr --directional", "more than 268435456 texels"),
         ("scene.obj --lightmap all --size 8x8", "--lightmap has no output"),
@@ -289,4 +289,28 @@ fn maps_that_cannot_be_are_refused_before_the_work() {
         assert!(said.contains(message), "{arguments}: {said}");
     }
     assert!(!folder.path("a.exr").exists());
+}
+
+#[test]
+fn an_object_has_a_map_of_its_own() {
+    // Two squares in one material: their charts overlap, and only together.
+    let square = |name: &str, y: u32, first: u32| {
+        let corners = format!("v 0 {y} 2\nv 2 {y} 2\nv 2 {y} 0\nv 0 {y} 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n");
+        let face: String = (first..first + 4).map(|i| format!(" {i}/{i}")).collect();
+        format!("o {name}\n{corners}usemtl grey\nf{face}\n")
+    };
+    let lamp = "o sun\nv 0 4 2\nv 0 4 0\nv 2 4 0\nv 2 4 2\nusemtl lamp\nf 9 10 11 12\n";
+    let mesh = format!("{}{}{lamp}", square("shelf", 1, 1), square("ground", 0, 5));
+    let folder = folder("lightmap-object", &mesh, GREY);
+    let said = folder.refused("bake scene.obj --lightmap grey --size 8x8 -o a.exr");
+    assert!(said.contains("overlap"), "{said}");
+    let red = |name: &str| {
+        let bake =
+            format!("bake scene.obj --lightmap {name} --size 8x8 --spp 64 --light direct -o {name}.exr");
+        folder.object(&format!("{bake} --json"));
+        Map::read(&folder, &format!("{name}.exr")).texel(4, 4)[0]
+    };
+    // The shelf is below the lamp, and covers the ground.
+    let [shelf, ground] = ["shelf", "ground"].map(red);
+    assert!(shelf > 0.3 && ground == 0.0, "{shelf} {ground}");
 }

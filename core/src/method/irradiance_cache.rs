@@ -11,7 +11,7 @@ pub use settings::CacheSettings;
 
 use super::cache_resolution::{CacheResolution, CachedPicture};
 use super::executor::{Executor, Passed};
-use super::record_placement::{CacheBuilder, LobeGathering, RecordPlacement, step_points};
+use super::record_placement::{CacheBuilder, LobeGathering, PlaceSource, RecordPlacement, step_points};
 use super::view_placement::{ViewPlacement, Views};
 use super::{RenderContext, RenderMethod, Round};
 use crate::bsdf::Features;
@@ -20,6 +20,7 @@ use crate::cache::radiance::{PooledRecord, ServedLobes};
 use crate::cache::view::ViewRecords;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::cached::gather::GatherPoint;
+use crate::transport::cached::point_places::PointPlaces;
 use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 
 /// Least radius of a record in pixels: pixels that placement looks at and that are neighbours share it.
@@ -57,6 +58,8 @@ pub struct IrradianceCaching<'a, F> {
     /// Resolution of the records.
     resolution: CacheResolution,
     size: [u32; 2],
+    /// Points that take the place of the pixels.
+    points: Option<PointPlaces<'a>>,
     builders: [CacheBuilder<'a>; 2],
     step: &'a mut [GatherPoint],
     lobes: Option<LobeGathering<'a>>,
@@ -144,6 +147,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             finer,
             resolution: CacheResolution { strata: settings.strata as u32, error: settings.error },
             size: [context.settings.width, context.settings.height],
+            points: None,
             builders,
             step,
             lobes,
@@ -159,6 +163,11 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             method.finer = None;
         }
         Ok(method)
+    }
+
+    /// Places the records for these points and not for what the camera sees.
+    pub fn for_points(self, points: PointPlaces<'a>) -> Self {
+        Self { points: Some(points), ..self }
     }
 
     /// Gather rays and density of the records.
@@ -263,7 +272,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
             flux: self.flux.each_ref(),
             metric: self.metric,
             least_pixels: LEAST_PIXELS,
-            size: self.size,
+            source: self.points.map_or(PlaceSource::Picture(self.size), PlaceSource::Points),
             step: &mut *self.step,
             lobes: self.lobes.as_mut(),
         };

@@ -1,24 +1,32 @@
 //! Irradiance at points, each with a 95 % interval, in the caller's memory and on the caller's threads.
 
+mod audit;
 mod film;
 mod layout;
+mod memory;
+mod structures;
 mod value;
 
 pub use film::PointFilm;
 pub use value::{PointIrradiance, PointSettings};
 
 use super::build::{All, Build, DiffuseTextured, Opaque, build_for, of_build};
-use super::{RenderError, RequiredMemory, Until};
+use super::{RenderError, Until};
 use crate::bvh::Bvh;
-use crate::film::{PIXELS_PER_TILE, Pixel};
+use crate::film::{Dropped, PIXELS_PER_TILE, Pixel};
 use crate::findings::Findings;
 use crate::light::{LightSampler, luminance};
-use crate::memory::{Arena, Buffer, Footprint, OutOfMemory};
-use crate::method::{Executor, IrradiancePoints, PilotSize, RenderContext, RenderState, Round};
+use crate::memory::{Arena, Buffer, OutOfMemory};
+use crate::method::{
+    Executor, IrradiancePoints, PilotSize, PointMethod, RenderContext, RenderState, Round, WantedIrradiance,
+};
 use crate::scene::Scene;
 use crate::transport::{Counters, IrradiancePoint, PathSettings, UNLIMITED};
+use audit::{Bias, PointAudit};
+use film::OFFSET;
 use layout::{Layout, number_of, order_along_curve};
 use libm::{ceil, fmin, sqrt};
+use structures::{method_of, structures};
 
 /// Samples of a tile between two questions whether the executor is over.
 const STEP: u32 = 16;
@@ -28,9 +36,6 @@ const FIRST_DECISION: u32 = 64;
 
 /// Fraction of the points of a finished tile whose intervals are within the error.
 const WITHIN: f64 = 0.95;
-
-/// Offset of relative errors, in means of all points.
-const OFFSET: f32 = 0.1;
 
 /// Points of a task that prepares points.
 const CHUNK: usize = 1024;
@@ -80,6 +85,8 @@ type Builds<'a> =
 pub struct IrradianceRenderer<'a> {
     build: Builds<'a>,
     film: PointFilm<'a>,
+    /// Path-traced points, with a cache.
+    audit: Option<PointAudit<'a>>,
     /// 1 for each tile that has reached the error.
     finished: &'a mut [u8],
     /// Samples at which tiles are judged next.
@@ -89,13 +96,6 @@ pub struct IrradianceRenderer<'a> {
 }
 
 impl<'a> IrradianceRenderer<'a> {
-    /// Memory for so many points in `scene`, before anything is built.
-    pub fn required_memory(scene: &Scene, points: usize) -> RequiredMemory {
-        let lights = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
-        let structures = Bvh::footprint_of(&scene.mesh).and(lights).and(Self::footprint(scene, points));
-        RequiredMemory { structures: structures.bytes(), scratch: Self::scratch().bytes() }
-    }
-
     /// Builds the hierarchy and the lights of `scene`, whose camera is of no matter. Points that lie on a
     /// surface within rounding are put on it, on the side of their normals.
     ///
@@ -118,19 +118,6 @@ impl<'a> IrradianceRenderer<'a> {
         let bvh = Bvh::build_with(&scene.mesh, arena, settings.level, executor.fork())?;
         let lights = LightSampler::build(scene, arena)?.with_level(settings.level);
         Self::over((scene, bvh, lights), points, settings, arena, executor)
-    }
-
-    /// Working memory of a worker.
-    #[doc(hidden)]
-    pub fn scratch() -> Footprint {
-        IrradiancePoints::<All>::scratch()
-    }
-
-    /// Memory of the points and their photons alone, beside structures of the scene that exist.
-    #[doc(hidden)]
-    pub fn footprint(scene: &Scene, points: usize) -> Footprint {
-        let layout = Layout::of(points);
-        layout.footprint().and(IrradiancePoints::<All>::footprint(scene, layout.pixels()))
     }
 
     /// As [`IrradianceRenderer::new`], over structures of the scene that exist.
@@ -179,11 +166,18 @@ impl<'a> IrradianceRenderer<'a> {
         // Without positions nothing can be sampled: the film stays empty.
         let ordered = if passed.is_complete { &*ordered } else { &[] };
         let film = PointFilm::new(points.len(), (ordered, places), shard, arena)?;
-        let photons = IrradiancePoints::<All>::footprint(scene, pixels).bytes();
-        let memory = &mut Buffer::new(arena.slice(photons.min(arena.available()))?);
-        let wanted = (ordered, settings.light, settings.caustics);
+        let method = method_of(settings, &layout);
+        let mut audit = match method {
+            PointMethod::Path => None,
+            _ => Some(PointAudit::new(&film, arena)?),
+        };
+        let bytes = structures(scene, &layout, method).bytes();
+        let memory = &mut Buffer::new(arena.slice(bytes.min(arena.available()))?);
+        let PointSettings { light: part, caustics, goal, .. } = *settings;
+        let wanted = &WantedIrradiance { points: ordered, part, caustics, method, goal };
         let build = build_for!(scene, IrradiancePoints::new(&context, wanted, memory, executor)?);
-        Ok(Self { build, film, finished, decision: FIRST_DECISION, error: 0.0 })
+        audit = audit.filter(|_| of_build!(&build, method => method.limits_of_cache().is_some()));
+        Ok(Self { build, film, audit, finished, decision: FIRST_DECISION, error: 0.0 })
     }
 
     /// Adds samples to each point `until` the given end, or until the executor is over. By an error, tiles of
@@ -196,7 +190,10 @@ impl<'a> IrradianceRenderer<'a> {
         match until {
             Until::Samples(target) => {
                 self.sample(executor, target, |_, _| true)?;
-                self.film.estimate(executor);
+                if self.estimate(executor, target) {
+                    self.sample(executor, target, |_, _| true)?;
+                    self.estimate(executor, target);
+                }
                 Ok(())
             }
             Until::Error(error) => self.step_within(executor, error, MOST_SAMPLES),
@@ -214,7 +211,10 @@ impl<'a> IrradianceRenderer<'a> {
         most: u32,
     ) -> Result<(), RenderError> {
         self.sample_within((error, most), executor)?;
-        self.film.estimate(executor);
+        if self.estimate(executor, most) {
+            self.sample_within((error, most), executor)?;
+            self.estimate(executor, most);
+        }
         Ok(())
     }
 
@@ -265,14 +265,52 @@ impl<'a> IrradianceRenderer<'a> {
         fill(&mut self.film.state)
     }
 
-    /// Decisions and numbers of caustic photons.
+    /// Decisions and numbers of caustic photons and of a cache.
     pub fn findings(&self) -> Findings {
-        of_build!(&self.build, method => method.findings())
+        let findings = of_build!(&self.build, method => method.findings());
+        findings.and(self.audit.as_ref().map(|audit| audit.finding(audit.bias(&self.film))))
     }
 
     /// Rays and rejected samples so far.
     pub fn counters(&self) -> Counters {
-        self.film.state.counters
+        let audit = self.audit.as_ref().map(PointAudit::counters).unwrap_or_default();
+        let mut counters = self.film.state.counters;
+        counters += audit;
+        counters
+    }
+
+    /// Estimates the intervals after `samples` of each point. Returns whether an audit has found too much
+    /// bias for the cache: the film is then empty, and paths are to fill it.
+    fn estimate(&mut self, executor: &mut impl Executor, samples: u32) -> bool {
+        let Some(audit) = &self.audit else {
+            self.film.estimate(executor, 0.0);
+            return false;
+        };
+        let bias = audit.bias(&self.film).unwrap_or(Bias { lower: 0.0, upper: f64::INFINITY });
+        let most = of_build!(&self.build, method => method.limits_of_cache());
+        let is_useless = most.is_some_and(|most| {
+            bias.lower > most.bias || samples != MOST_SAMPLES && f64::from(samples) > most.samples
+        });
+        if samples >= FIRST_DECISION && is_useless && !executor.is_over() {
+            self.leave_cache();
+            return true;
+        }
+        self.film.estimate(executor, bias.upper as f32);
+        false
+    }
+
+    /// Begins again by path tracing.
+    fn leave_cache(&mut self) {
+        of_build!(&mut self.build, method => method.leave_cache());
+        let Self { film, finished, audit, decision, .. } = self;
+        film.state.film.pixels_mut().fill(Pixel::default());
+        film.state.samples.fill(0);
+        film.state.dropped.fill(Dropped::default());
+        finished.fill(0);
+        if let Some(audit) = audit.take() {
+            film.state.counters += audit.counters();
+        }
+        *decision = FIRST_DECISION;
     }
 
     /// Brings the tiles that are open to `target` samples.
@@ -282,10 +320,19 @@ impl<'a> IrradianceRenderer<'a> {
         target: u32,
         is_open: impl Fn(&[u8], usize) -> bool + Send + Sync,
     ) -> Result<(), OutOfMemory> {
-        let Self { build, film, finished, .. } = self;
+        let Self { build, film, finished, audit, .. } = self;
         let finished = &**finished;
         let round = &mut Round { executor, state: &mut film.state, target, step: STEP };
-        of_build!(build, method => method.sample(round, |tile| is_open(finished, tile)))
+        of_build!(build, method => {
+            method.sample(round, |tile| is_open(finished, tile))?;
+            if method.limits_of_cache().is_none() {
+                *audit = None;
+            }
+            match audit {
+                Some(audit) => audit.sample(method, round.executor, (target, STEP)),
+                None => Ok(()),
+            }
+        })
     }
 
     /// Adds samples to the tiles that have not reached `error`, until all have or have `most` samples. Tiles
@@ -303,7 +350,9 @@ impl<'a> IrradianceRenderer<'a> {
             if executor.is_over() || !is_decision {
                 return Ok(());
             }
-            self.film.estimate(executor);
+            if self.estimate(executor, target) {
+                continue;
+            }
             self.finish_tiles(error as f32);
             if target == MOST_SAMPLES {
                 return Ok(());
@@ -336,11 +385,7 @@ impl<'a> IrradianceRenderer<'a> {
     fn finish_tiles(&mut self, error: f32) {
         let PointFilm { layout, ref state, ref half_widths, .. } = self.film;
         let pixels = &state.film.pixels()[..layout.pixels()];
-        let (sum, count) = pixels
-            .iter()
-            .filter(|pixel| pixel.count() > 0)
-            .fold((0.0, 0u64), |(sum, count), pixel| (sum + f64::from(luminance(pixel.mean())), count + 1));
-        let offset = OFFSET * (sum / count.max(1) as f64) as f32;
+        let offset = OFFSET * self.film.mean() as f32;
         let tiles = pixels.chunks(PIXELS_PER_TILE).zip(half_widths.chunks(PIXELS_PER_TILE));
         for ((pixels, half_widths), finished) in tiles.zip(self.finished.iter_mut()) {
             // Replicates of a point average their noise.

@@ -46,7 +46,7 @@ pub(super) const BYTES_OF_TRIANGLE: usize = size_of::<ChartTriangle>() + 3 * 48;
 /// A sentence if there are no charts, or if some leave the unit square.
 pub(super) fn charts(
     loaded: &LoadedScene,
-    is_chosen: impl Fn(&Triangle) -> bool,
+    is_chosen: impl Fn(u32, &Triangle) -> bool,
     size: [u32; 2],
 ) -> Result<Charts, String> {
     if loaded.texcoords.is_empty() {
@@ -57,7 +57,7 @@ pub(super) fn charts(
     let mut corners_of = Vec::new();
     let mut outside: Option<(usize, String)> = None;
     for (number, triangle) in (0..).zip(&loaded.triangles) {
-        if !is_chosen(triangle) {
+        if !is_chosen(number, triangle) {
             continue;
         }
         let uv =

@@ -23,7 +23,7 @@ const INSIDE: f32 = 0.5;
 /// Settings of a lightmap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightmapSettings {
-    /// Name of the meshes or materials whose triangles have texels; `None`: all.
+    /// Name of the meshes, objects or materials whose triangles have texels; `None`: all.
     pub subject: Option<String>,
     /// Width and height in texels.
     pub size: [u32; 2],
@@ -67,7 +67,7 @@ pub enum LightmapError {
 impl fmt::Display for LightmapError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Subject(name, _) => write!(f, "no mesh or material is called `{name}`"),
+            Self::Subject(name, _) => write!(f, "no mesh, object or material is called `{name}`"),
             Self::Charts(why) => f.write_str(why),
             Self::Overlaps(count, uv) => {
                 let [u, v] = uv.map(f64::from_bits);
@@ -91,7 +91,7 @@ impl LightmapError {
             Self::Subject(_, names) => format!("the names are all, {}", names.join(", ")),
             Self::Charts(_) | Self::Overlaps(..) => {
                 "unwrap the mesh into one square without overlaps, as by \
-                 Lightmap Pack of Blender or by xatlas, or choose a mesh or material by --lightmap NAME"
+                 Lightmap Pack of Blender or by xatlas, or choose a mesh, an object or a material by --lightmap NAME"
                     .into()
             }
             Self::Texels => "lower --size".into(),
@@ -255,23 +255,28 @@ impl LightmapSettings {
     }
 }
 
-/// True for triangles of the meshes or materials of this name; `None`: all.
+/// True for triangles of the meshes, objects or materials of this name, by their number; `None`: all.
 fn chosen<'a>(
     loaded: &'a LoadedScene,
     subject: Option<&'a str>,
-) -> Result<impl Fn(&Triangle) -> bool + 'a, LightmapError> {
-    let LoadedScene { meshes, material_names, .. } = loaded;
-    let mut names = meshes.iter().map(|(name, _)| name).chain(material_names);
-    if let Some(subject) = subject.filter(|subject| !names.any(|name| name == subject)) {
-        let names = meshes.iter().map(|(name, _)| name).chain(material_names).cloned().collect();
-        return Err(LightmapError::Subject(subject.to_owned(), names));
+) -> Result<impl Fn(u32, &Triangle) -> bool + 'a, LightmapError> {
+    let LoadedScene { meshes, material_names, object_names, triangle_objects, .. } = loaded;
+    let names = || meshes.iter().map(|(name, _)| name).chain(object_names).chain(material_names);
+    if let Some(subject) = subject.filter(|subject| !names().any(|name| name == subject)) {
+        let mut all: Vec<String> = names().cloned().collect();
+        all.sort_unstable();
+        all.dedup();
+        return Err(LightmapError::Subject(subject.to_owned(), all));
     }
-    Ok(move |triangle: &Triangle| {
+    Ok(move |number: u32, triangle: &Triangle| {
         let is_of_mesh = |(name, vertices): &(String, Range<u32>)| {
             subject == Some(name) && vertices.contains(&triangle.vertices[0])
         };
         let material = material_names[triangle.material as usize].as_str();
-        subject.is_none_or(|subject| subject == material) || meshes.iter().any(is_of_mesh)
+        let object =
+            triangle_objects.get(number as usize).and_then(|object| object_names.get(*object as usize));
+        subject.is_none_or(|subject| subject == material || object.is_some_and(|object| object == subject))
+            || meshes.iter().any(is_of_mesh)
     })
 }
 

@@ -20,7 +20,7 @@ use halflight::quantity::readable_seconds;
 use halflight::render::Stop;
 use halflight::report::{file_name, findings_object};
 use halflight::values::{Depth, Samples, TargetError};
-use halflight_core::{IrradiancePoint, LightPart};
+use halflight_core::{IrradiancePoint, LightPart, PointMethod};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -59,6 +59,11 @@ pub(super) struct Bake {
     /// Caustic photons, which find light through glass and by mirrors
     #[arg(long, default_value = "auto")]
     caustics: Caustics,
+
+    /// Source of indirect light. A cache shares it among near points, and an audit adds its bias to the
+    /// intervals; `auto` takes one where it is predicted to have less error
+    #[arg(long, default_value = "path", conflicts_with_all = ["checkpoint", "resume", "shard"])]
+    method: Method,
 
     /// Samples per point
     #[arg(long, value_name = "N", value_parser = values::checked::<u32, Samples>)]
@@ -110,6 +115,16 @@ enum Light {
     Direct,
     /// Light that surfaces have scattered
     Indirect,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Method {
+    /// Path tracing at every point
+    Path,
+    /// Irradiance cache
+    IrradianceCache,
+    /// Either
+    Auto,
 }
 
 impl Bake {
@@ -186,6 +201,11 @@ impl Bake {
                 Light::Indirect => LightPart::Indirect,
             },
             caustics: self.caustics == Caustics::Auto,
+            method: match self.method {
+                Method::Path => PointMethod::Path,
+                Method::IrradianceCache => PointMethod::IrradianceCache,
+                Method::Auto => PointMethod::Auto,
+            },
             seed: self.seed,
             max_depth: self.max_depth.map(u32::from),
             threads: self.threads(),

@@ -41,7 +41,7 @@ pub(crate) fn merge_points(files: &[PathBuf]) -> Result<(Baked, Vec<u8>), Render
     };
     (film.points, film.places) = (&points, &places);
     let pool = Pool::new(None)?;
-    Workers::new(&pool).estimating(|executor| film.estimate(executor));
+    Workers::new(&pool).estimating(|executor| film.estimate(executor, 0.0));
     let baked = Baked {
         values: film.values().collect(),
         back_faces,

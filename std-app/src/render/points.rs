@@ -12,11 +12,12 @@ use crate::save::Patience;
 use core::sync::atomic::AtomicBool;
 use halflight_core::findings::Findings;
 use halflight_core::memory::{Arena, Footprint};
-use halflight_core::method::Shard;
+use halflight_core::method::{Shard, rays_per_second};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Counters, SceneContext};
 use halflight_core::{
-    IrradiancePoint, IrradianceRenderer, Level, LightPart, PointIrradiance, PointSettings, Until,
+    Goal, IrradiancePoint, IrradianceRenderer, Level, LightPart, PointIrradiance, PointMethod, PointSettings,
+    Until,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -37,6 +38,8 @@ pub struct BakeSettings {
     pub light: LightPart,
     /// Caustic photons where a pilot finds that they pay.
     pub caustics: bool,
+    /// Source of the indirect light. A bake in parts, with a file, has paths alone.
+    pub method: PointMethod,
     /// Part of the points to estimate, in tiles of 256 near points; the others have no samples.
     pub shard: Shard,
     /// Bake file to write.
@@ -70,6 +73,7 @@ impl Default for BakeSettings {
             stop: Self::SENSIBLE,
             light: LightPart::All,
             caustics: true,
+            method: PointMethod::Path,
             shard: Shard::WHOLE,
             checkpoint: None,
             attached: Vec::new(),
@@ -107,7 +111,7 @@ pub struct Baked {
     pub back_faces: Vec<f32>,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],
-    /// Decisions and numbers of caustic photons.
+    /// Decisions and numbers of caustic photons and of a cache.
     pub findings: Findings,
     /// Rays and rejected samples.
     pub counters: Counters,
@@ -138,10 +142,15 @@ impl Baked {
 }
 
 impl BakeSettings {
-    /// The settings of the core.
-    fn of_core(&self) -> PointSettings {
-        let Self { seed, max_depth, level, light, caustics, shard, .. } = *self;
-        PointSettings { seed, max_depth, level, light, caustics, shard }
+    /// The settings of the core for a scene of so many `triangles` on so many threads.
+    fn of_core(&self, triangles: usize, threads: usize) -> PointSettings {
+        let Self { seed, max_depth, level, light, caustics, shard, ref stop, .. } = *self;
+        let is_in_file = self.checkpoint.is_some() || self.resume.is_some();
+        let method = if is_in_file { PointMethod::Path } else { self.method };
+        let rays = rays_per_second(triangles) * threads as f64;
+        let rays = stop.seconds.map(|seconds| seconds * rays);
+        let goal = Goal { rays, samples: stop.most_samples(), error: stop.error };
+        PointSettings { seed, max_depth, level, light, caustics, shard, method, goal }
     }
 }
 
@@ -214,7 +223,7 @@ pub(crate) fn with_points(
     interrupt: &AtomicBool,
 ) -> Result<Baked, RenderError> {
     let start = Instant::now();
-    let core = settings.of_core();
+    let core = settings.of_core(scene.mesh.triangles.len(), pool.count());
     let identity = BakeHeader::identity(scene, points, &core);
     let bank = Bank::new();
     let mut memory = Memory::of_scene(scene, settings.memory, &bank);
@@ -224,7 +233,7 @@ pub(crate) fn with_points(
     earlier.iter().try_for_each(|file| file.check(&identity, settings.shard))?;
     let given = Footprint::default().slice::<IrradiancePoint>(points.len()).slice::<f32>(points.len());
     memory.set_aside("given points", given)?;
-    let mut lines = memory.take("points", IrradianceRenderer::footprint(scene, points.len()))?;
+    let mut lines = memory.take("points", IrradianceRenderer::footprint(scene, points.len(), core.method))?;
     let workers = Workers::new(pool).ending_at(Deadline::until(interrupt).within(settings.stop.seconds));
     let deadline = workers.deadline.after(1.0);
     let mut scratch = memory.take_each("working memory", IrradianceRenderer::scratch(), workers.count())?;

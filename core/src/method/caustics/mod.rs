@@ -16,6 +16,7 @@ mod tests;
 pub use emission::{CausticEmission, CausticSettings, least_footprint};
 pub use photons::{CausticPhotons, RecordPhotons};
 pub use points::PointReceivers;
+pub(super) use points::{for_pilot_tiles, median_step};
 pub use prepass::{Decision, Prepass, prepass, unseen, unseen_footprint};
 
 use super::path::{PathTracing, Reuse};

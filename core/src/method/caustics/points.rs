@@ -83,29 +83,6 @@ impl<'p, 'a, F: Features> PointReceivers<'p, 'a, F> {
         Ok(Some(Self { integrator: context.integrator(), points, part, map, radii, in_kernel }))
     }
 
-    /// Runs `work` on the pixels of tiles that are spread over the film, with `samples` of each point.
-    fn for_tiles<E: LightEstimator<F>, T: Send + Copy>(
-        &self,
-        (integrator, samples): (&PathIntegrator<F, E>, u32),
-        executor: &mut impl Executor,
-        work: impl Fn(&[Pixel], &Counters) -> T + Sync,
-    ) -> Result<[Option<T>; PILOT_TILES], OutOfMemory> {
-        let mut out = [None; PILOT_TILES];
-        let tiles = self.points.len().div_ceil(PIXELS_PER_TILE);
-        let spread = Tile::spread_over(TILE, TILE * tiles as u32, PILOT_TILES).zip(out.iter_mut());
-        let _ = executor.pass(spread, |_, (tile, out), worker| {
-            let of_tile = self.points.chunks(PIXELS_PER_TILE).nth(tile).unwrap_or_default();
-            let mut arena = worker.scratch.scratch();
-            let pixels = arena.slice::<Pixel>(of_tile.len())?;
-            pixels.fill(Pixel::default());
-            let part = (of_tile, self.part);
-            let counters = integrator.sample_irradiance(part, 0..samples, WAVE, &mut arena, pixels)?;
-            *out = Some(work(pixels, &counters));
-            Ok(Counters::default())
-        })?;
-        Ok(out)
-    }
-
     fn mean_by<E: LightEstimator<F>>(
         &self,
         integrator: &PathIntegrator<F, E>,
@@ -115,7 +92,7 @@ impl<'p, 'a, F: Features> PointReceivers<'p, 'a, F> {
             let light = pixels.iter().map(|pixel| REFLECTED * pixel.mean().element_sum() / 3.0);
             light.sum::<f32>() / pixels.len().max(1) as f32
         };
-        let means = self.for_tiles((integrator, 1), executor, mean)?;
+        let means = for_pilot_tiles((integrator, 1), (self.points, self.part), executor, mean)?;
         Ok(means.iter().flatten().sum::<f32>() / means.iter().flatten().count().max(1) as f32)
     }
 
@@ -127,7 +104,7 @@ impl<'p, 'a, F: Features> PointReceivers<'p, 'a, F> {
         let of_tile =
             |pixels: &[Pixel], counters: &Counters| Pilot::of_points(pixels, (REFLECTED, mean), counters);
         let mut pilot = Pilot::default();
-        let tiles = self.for_tiles((integrator, SAMPLES), executor, of_tile)?;
+        let tiles = for_pilot_tiles((integrator, SAMPLES), (self.points, self.part), executor, of_tile)?;
         tiles.into_iter().flatten().for_each(|tile| pilot += tile);
         Ok(pilot)
     }
@@ -187,13 +164,35 @@ impl<'a, F: Features> Receivers<'a, F> for PointReceivers<'_, 'a, F> {
     }
 }
 
+/// Runs `work` on the pixels of tiles that are spread over the film of `points`, with `samples` of each.
+pub(in crate::method) fn for_pilot_tiles<F: Features, E: LightEstimator<F>, T: Send + Copy>(
+    (integrator, samples): (&PathIntegrator<F, E>, u32),
+    (points, part): (&[IrradiancePoint], LightPart),
+    executor: &mut impl Executor,
+    work: impl Fn(&[Pixel], &Counters) -> T + Sync,
+) -> Result<[Option<T>; PILOT_TILES], OutOfMemory> {
+    let mut out = [None; PILOT_TILES];
+    let tiles = points.len().div_ceil(PIXELS_PER_TILE);
+    let spread = Tile::spread_over(TILE, TILE * tiles as u32, PILOT_TILES).zip(out.iter_mut());
+    let _ = executor.pass(spread, |_, (tile, out), worker| {
+        let of_tile = points.chunks(PIXELS_PER_TILE).nth(tile).unwrap_or_default();
+        let mut arena = worker.scratch.scratch();
+        let pixels = arena.slice::<Pixel>(of_tile.len())?;
+        pixels.fill(Pixel::default());
+        let counters = integrator.sample_irradiance((of_tile, part), 0..samples, WAVE, &mut arena, pixels)?;
+        *out = Some(work(pixels, &counters));
+        Ok(Counters::default())
+    })?;
+    Ok(out)
+}
+
 /// Numbers of at most [`FOCUS_POINTS`] of `points`, evenly spread.
 fn spread_over(points: &[IrradiancePoint]) -> impl Iterator<Item = usize> {
     (0..points.len()).step_by(points.len().div_ceil(FOCUS_POINTS).max(1))
 }
 
 /// Median distance of a point to the nearest one elsewhere in its tile; `None` where all are in one place.
-fn median_step(points: &[IrradiancePoint]) -> Option<f32> {
+pub(in crate::method) fn median_step(points: &[IrradiancePoint]) -> Option<f32> {
     let (mut steps, mut count) = ([f32::INFINITY; FOCUS_POINTS], 0);
     for (slot, number) in steps.iter_mut().zip(spread_over(points)) {
         let of_tile = points.chunks(PIXELS_PER_TILE).nth(number / PIXELS_PER_TILE).unwrap_or_default();

@@ -7,8 +7,10 @@
 //! behind rough surfaces.
 
 pub(super) mod builder;
+mod source;
 
 pub use builder::CacheBuilder;
+pub use source::PlaceSource;
 
 use super::executor::{Executor, Passed};
 use crate::bsdf::Features;
@@ -17,11 +19,8 @@ use crate::cache::radiance::{GatherTables, Representation, ServedLobes};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::cached::gather::{GatherPoint, Gathering};
 use crate::transport::cached::lobe::CoefficientGathering;
-use crate::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
+use crate::transport::cached::placement::{PIXELS, Via};
 use crate::transport::{CausticMerging, Counters, PathIntegrator};
-
-/// Pixels along the side of the square of which one pixel is looked at.
-const STRIDE: u32 = 2;
 
 /// Pixels of a step: those of 16 tasks of [`PIXELS`].
 const STEP: usize = 16 * PIXELS;
@@ -76,8 +75,8 @@ pub struct RecordPlacement<'p, 'a, F> {
     pub metric: metric::Settings,
     /// Least radius of a record, in pixels.
     pub least_pixels: f32,
-    /// Width and height of the picture.
-    pub size: [u32; 2],
+    /// Where records may be placed.
+    pub source: PlaceSource<'p>,
     /// [`step_points`].
     pub step: &'p mut [GatherPoint],
     /// Gathering of records with coefficients, if some lobes are served.
@@ -133,14 +132,15 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         executor: &mut impl Executor,
     ) -> Result<Passed, OutOfMemory> {
         let mut counters = Counters::default();
-        let order = self.order();
+        let length = self.source.len();
         let least_pixels = self.least_pixels;
         // With a limit of depth only points that are seen ask for records.
-        let has_rough = self.integrator.has_rough_surfaces() && !self.integrator.is_limited();
+        let has_rough =
+            self.source.has_views() && self.integrator.has_rough_surfaces() && !self.integrator.is_limited();
         while let Some(target) = builder.target()
             && !builder.is_finished()
         {
-            if builder.next >= order.len() {
+            if builder.next >= length {
                 builder.end_sweep(has_rough);
                 continue;
             }
@@ -204,7 +204,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         executor: &mut impl Executor,
         counters: &mut Counters,
     ) -> Result<f32, OutOfMemory> {
-        let first = self.order().len().saturating_sub(STEP as u64);
+        let first = self.source.len().saturating_sub(STEP as u64);
         let target = (builder.index, Via::Specular);
         let least_pixels = self.least_pixels;
         let is_open = move |point: &GatherPoint| !point.is_confined(least_pixels);
@@ -227,11 +227,6 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         Ok(nearly_all.copied().filter(|_| passed.is_complete).unwrap_or(1.0))
     }
 
-    fn order(&self) -> ProgressiveOrder {
-        let [width, height] = self.size;
-        ProgressiveOrder::new(width, height, STRIDE)
-    }
-
     /// Finds the points of the step that begins with pixel `first` of the order, as far as they are wanted,
     /// and returns their number; `None` where the executor ends it early.
     fn missing_points(
@@ -242,7 +237,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         executor: &mut impl Executor,
         counters: &mut Counters,
     ) -> Result<Option<usize>, OutOfMemory> {
-        let (order, integrator) = (self.order(), self.integrator);
+        let (source, integrator) = (self.source.order(), self.integrator);
         let lobes = self.lobes.as_ref().map(|gathering| gathering.lobes);
         let leave_out = |points: &mut [GatherPoint]| {
             points.iter_mut().filter(|point| !is_wanted(point)).for_each(|point| *point = GatherPoint::NONE);
@@ -250,7 +245,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         let passed = executor.pass(self.step.chunks_mut(PIXELS), |task, points, _| {
             let mut counters = Counters::default();
             let first = first + (task * PIXELS) as u64;
-            integrator.places_with(&order, first, target, lobes.as_ref(), points, &mut counters);
+            source.places(integrator, (first, target), lobes.as_ref(), points, &mut counters);
             leave_out(points);
             integrator.measure_overhangs(points, &mut counters);
             leave_out(points);

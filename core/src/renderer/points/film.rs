@@ -4,11 +4,15 @@
 use super::layout::Layout;
 use super::value::PointIrradiance;
 use crate::estimate::{POOLED_POINTS, half_width, point_variances};
+use crate::light::luminance;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::method::{Executor, RenderState, Shard};
 use crate::reconstruction::for_pieces;
 use crate::transport::IrradiancePoint;
 use glam::Vec3;
+
+/// Offset of relative errors, in means of all points.
+pub(super) const OFFSET: f32 = 0.1;
 
 /// Film of points.
 pub struct PointFilm<'a> {
@@ -59,8 +63,18 @@ impl<'a> PointFilm<'a> {
         each.map(move |places| PointIrradiance::of_replicates(places, state.film.pixels(), half_widths))
     }
 
-    /// Estimates the half-widths of all points.
-    pub fn estimate(&mut self, executor: &mut impl Executor) {
+    /// Mean luminance of all points with samples.
+    pub fn mean(&self) -> f64 {
+        let pixels = self.state.film.pixels().iter().filter(|pixel| pixel.count() > 0);
+        let (sum, count) = pixels
+            .fold((0.0, 0u64), |(sum, count), pixel| (sum + f64::from(luminance(pixel.mean())), count + 1));
+        sum / count.max(1) as f64
+    }
+
+    /// Estimates the half-widths of all points, whose squared bias relative to the value and a tenth of the
+    /// mean is known.
+    pub fn estimate(&mut self, executor: &mut impl Executor, bias: f32) {
+        let offset = if bias > 0.0 { OFFSET * self.mean() as f32 } else { 0.0 };
         let (points, total, pixels) = (self.points, self.layout.pixels(), self.state.film.pixels());
         let place = |i: usize| {
             let point = points.get(i).copied().unwrap_or_default();
@@ -73,8 +87,16 @@ impl<'a> PointFilm<'a> {
             let mut variances = [f32::INFINITY; POOLED_POINTS];
             point_variances(&pixels[start..end], |i| place(start + i), &mut variances);
             let skipped = block * POOLED_POINTS - start;
-            for (half, variance) in out.iter_mut().zip(variances.iter().skip(skipped)) {
-                *half = half_width(*variance);
+            let of_block = variances.iter().zip(&pixels[start..end]).skip(skipped);
+            for (half, (variance, pixel)) in out.iter_mut().zip(of_block) {
+                let square = match bias > 0.0 {
+                    true => {
+                        let value = luminance(pixel.mean());
+                        bias * (value * value + offset * offset)
+                    }
+                    false => 0.0,
+                };
+                *half = half_width(*variance + square);
             }
         });
     }

@@ -2,7 +2,8 @@
 
 use crate::film::Pixel;
 use crate::light::luminance;
-use crate::method::Shard;
+use crate::method::choice::Goal;
+use crate::method::{PointMethod, Shard};
 use crate::transport::LightPart;
 use crate::{Level, Rgb};
 
@@ -21,6 +22,11 @@ pub struct PointSettings {
     pub light: LightPart,
     /// Caustic photons where a pilot finds that they pay.
     pub caustics: bool,
+    /// Source of the indirect light.
+    pub method: PointMethod,
+    /// End of the bake, by which [`PointMethod::Auto`] chooses: its error is the relative half-width of
+    /// intervals.
+    pub goal: Goal,
 }
 
 impl Default for PointSettings {
@@ -32,6 +38,8 @@ impl Default for PointSettings {
             shard: Shard::WHOLE,
             light: LightPart::All,
             caustics: true,
+            method: PointMethod::Path,
+            goal: Goal::default(),
         }
     }
 }

@@ -164,6 +164,7 @@ fn sample_of(
 impl<F: Features> LightEstimator<F> for CacheView<'_> {
     type State = ();
     type Found = CachedLight;
+    const LOOKS_UP_POINTS: bool = true;
 
     #[inline]
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {

@@ -8,4 +8,5 @@ pub mod lobe;
 pub(in crate::transport) mod lookup;
 pub(in crate::transport) mod overhang;
 pub mod placement;
+pub mod point_places;
 pub mod view;

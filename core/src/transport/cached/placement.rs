@@ -25,7 +25,7 @@ const MOST_BOUNCES: u32 = 16;
 
 /// Minimum cosine of the shading normal to the geometric normal; beyond it the normals are of details too
 /// small for records.
-const SMOOTH: f32 = 0.9;
+pub(super) const SMOOTH: f32 = 0.9;
 
 /// Number of pixel widths across a lobe of pdf p, whose radius is about 1 / √(π p). A record seen in a rough
 /// surface is one of many in the pixel, and may be as coarse as that.

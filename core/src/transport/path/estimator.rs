@@ -94,9 +94,9 @@ impl RemainingLight {
         }
     }
 
-    /// Light that neither of two estimators supplies.
+    /// Light in both, as that which neither of two estimators supplies.
     #[inline]
-    fn and(self, other: Self) -> Self {
+    pub(in crate::transport) fn and(self, other: Self) -> Self {
         Self {
             wide: self.wide.zip(other.wide).map(|(a, b)| a.and(b)),
             narrow: self.narrow.and(other.narrow),
@@ -126,6 +126,10 @@ pub trait LightEstimator<F: Features>: Copy + Send + Sync {
     type Found: Copy + Default;
     /// True if the estimator adds nothing.
     const ADDS_NOTHING: bool = false;
+    /// True if the estimator looks up points whose irradiance is estimated, on surfaces and in space. Others
+    /// have the light of surfaces alone, and need no look-up there.
+    const LOOKS_UP_POINTS: bool = false;
+
     /// Maximum number of light samples per vertex.
     #[inline]
     fn light_samples(&self, _context: &SceneContext<F>) -> u32 {

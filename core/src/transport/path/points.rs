@@ -24,6 +24,7 @@ use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
 use core::ops::Range;
 use glam::{Vec2, Vec3};
+use halflight_simd::kernels::shade::BLOCK;
 
 /// The surface that stands for a point: π times its reflected radiance is the irradiance.
 const WHITE: Bsdf = Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE });
@@ -207,12 +208,17 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
     ) {
         let most = (self.estimator.light_samples(&self.context) + self.estimator.connections()) as usize;
         wave.wave.next = 0;
+        let mut found = [E::Found::default(); BLOCK];
         for i in 0..count {
+            if E::LOOKS_UP_POINTS && i.is_multiple_of(BLOCK) {
+                let block = i..count.min(i + BLOCK);
+                found = self.look_up_points(points, block, wave, counters);
+            }
             if wave.wave.shadows.count + most > wave.wave.shadows.rays.len() {
                 wave.wave.trace_shadow_rays(&self.context, counters);
             }
             let Some(point) = points.get(wave.wave.paths[i].place as usize) else { continue };
-            self.leave_point((&point.surface(), part), wave, i, counters);
+            self.leave_point((&point.surface(), part, found[i % BLOCK]), wave, i, counters);
         }
         wave.wave.trace_shadow_rays(&self.context, counters);
         let count = wave.wave.next;
@@ -220,10 +226,29 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
         self.trace_to_end(wave, count, counters);
     }
 
-    /// Light sample and next ray of path `i` at its point.
+    /// Looks up the data structure at the points of a block of paths.
+    fn look_up_points(
+        &self,
+        points: &[IrradiancePoint],
+        block: Range<usize>,
+        PathWave { wave, .. }: &mut PathWave<E::State, ()>,
+        counters: &mut Counters,
+    ) -> [E::Found; BLOCK] {
+        let mut surfaces = [None; BLOCK];
+        for (surface, i) in surfaces.iter_mut().zip(block.clone()) {
+            wave.rays[i].tag = i as u32;
+            *surface = points.get(wave.paths[i].place as usize).map(IrradiancePoint::surface);
+        }
+        let mut found = [E::Found::default(); BLOCK];
+        let scene = (&self.context, &self.settings);
+        self.estimator.look_up(scene, (wave, block), &surfaces, &mut found, counters);
+        found
+    }
+
+    /// Light sample and next ray of path `i` at its point, with the light that was `found` there.
     fn leave_point(
         &self,
-        (point, part): (&SurfacePoint<'a>, LightPart),
+        (point, part, found): (&SurfacePoint<'a>, LightPart, E::Found),
         PathWave { wave, memory }: &mut PathWave<E::State, ()>,
         i: usize,
         counters: &mut Counters,
@@ -252,17 +277,17 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
             rest: path.classes,
         };
         let Some(Path { path, state, shared }) = memory.path(wave.paths, i, &mut none) else { return };
-        // Data structures have the light of surfaces: a path from a free point begins as one from a camera.
-        let is_free = point.triangle == MISS;
+        // Photons have the light of surfaces: a path from a free point begins as one from a camera.
+        let is_free = point.triangle == MISS && !E::LOOKS_UP_POINTS;
         let rest = match is_free {
             true => RemainingLight::all(&vertex),
-            false => self.known(Path { path, state, shared }, &vertex, E::Found::default()),
+            false => self.known(Path { path, state, shared }, &vertex, found),
         };
         let rest = match part {
             LightPart::All => rest,
             LightPart::Direct => RemainingLight::of(PathClasses::EMITTED),
             LightPart::Indirect => {
-                RemainingLight { is_lit: true, ..RemainingLight::of(PathClasses::SCATTERED) }
+                rest.and(RemainingLight { is_lit: true, ..RemainingLight::of(PathClasses::SCATTERED) })
             }
         };
         let state = memory.states.get(i).unwrap_or(&none.0);

@@ -21,8 +21,8 @@ const OTHERS: [&str; 6] = ["points", "vertices", "probes", "checkpoint", "resume
 
 #[derive(Args)]
 pub(super) struct LightmapArgs {
-    /// Lightmap of a mesh, by the name of its file, of a material, or of `all`, in the texture coordinates
-    /// of the files
+    /// Lightmap of a mesh, by the name of its file, of an object, by its `o` or `g` or node, of a material,
+    /// or of `all`, in the texture coordinates of the files
     #[arg(long, value_name = "NAME", requires = "size", conflicts_with_all = OTHERS)]
     lightmap: Option<String>,
     /// Width and height of the lightmap in texels

@@ -18,7 +18,9 @@ use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::Arena;
 use halflight_core::method::irradiance_cache::LEAST_PIXELS;
-use halflight_core::method::record_placement::{CacheBuilder, RecordPlacement, step_footprint, step_points};
+use halflight_core::method::record_placement::{
+    CacheBuilder, PlaceSource, RecordPlacement, step_footprint, step_points,
+};
 use halflight_core::transport::{PathIntegrator, PathSettings};
 use points::{EXACT, held_out};
 use report::MetricError;
@@ -170,7 +172,7 @@ impl Irradiance {
                 flux: [&flux; 2],
                 metric: metric::Settings { error: looser * settings.error, ..settings },
                 least_pixels: wider * LEAST_PIXELS,
-                size: self.size,
+                source: PlaceSource::Picture(self.size),
                 step: &mut *step,
                 lobes: None,
             };

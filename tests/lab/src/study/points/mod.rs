@@ -16,7 +16,7 @@ use halflight_core::light::LightSampler;
 use halflight_core::memory::Arena;
 use halflight_core::renderer::{IrradianceRenderer, PointSettings, Until};
 use halflight_core::scene::Scene;
-use halflight_core::{IrradiancePoint, Level};
+use halflight_core::{Goal, IrradiancePoint, Level, PointMethod};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
@@ -45,6 +45,9 @@ pub(super) struct Points {
     /// Paths without caustic photons, also for the reference
     #[arg(long)]
     no_caustics: bool,
+    /// An irradiance cache in place of paths, but for the reference
+    #[arg(long)]
+    cache: bool,
     /// Number of threads [default: all hardware threads]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -95,11 +98,17 @@ impl Points {
 
         let points = places::lit(&built, self.points as usize, REFERENCE_SEED.into());
         let mut truth = Vec::new();
-        self.bake(&built, &points, REFERENCE_SEED, &mut executor, &mut |renderer, executor| {
-            renderer.step(executor, Until::Samples(self.reference_spp))?;
-            truth = renderer.values().map(|value| f64::from(value.value())).collect();
-            Ok(())
-        })?;
+        self.bake(
+            &built,
+            &points,
+            (REFERENCE_SEED, PointMethod::Path),
+            &mut executor,
+            &mut |renderer, executor| {
+                renderer.step(executor, Until::Samples(self.reference_spp))?;
+                truth = renderer.values().map(|value| f64::from(value.value())).collect();
+                Ok(())
+            },
+        )?;
         let mean = truth.iter().sum::<f64>() / truth.len().max(1) as f64;
         let (points, truth): (Vec<_>, Vec<_>) =
             points.into_iter().zip(truth).filter(|(_, truth)| *truth > 1e-3 * mean).unzip();
@@ -109,7 +118,7 @@ impl Points {
         let mut coverages: Vec<_> = self.spp.iter().map(|_| Coverage::new(&truth)).collect();
         for seed in 0..self.seeds {
             let mut samples = Samples::new(points.len());
-            self.bake(&built, &points, seed, &mut executor, &mut |renderer, executor| {
+            self.bake(&built, &points, (seed, self.method()), &mut executor, &mut |renderer, executor| {
                 let mut taken = 0;
                 for (spp, coverage) in self.spp.iter().zip(&mut coverages) {
                     while taken < *spp {
@@ -134,17 +143,23 @@ impl Points {
             .collect())
     }
 
+    fn method(&self) -> PointMethod {
+        if self.cache { PointMethod::IrradianceCache } else { PointMethod::Path }
+    }
+
     /// Runs `work` on a bake of `points`.
     fn bake(
         &self,
         Built { scene, bvh, lights }: &Built,
         points: &[IrradiancePoint],
-        seed: u32,
+        (seed, method): (u32, PointMethod),
         executor: &mut Threads,
         work: &mut dyn FnMut(&mut IrradianceRenderer, &mut Threads) -> Result<()>,
     ) -> Result<()> {
-        let mut memory = Pages::new(IrradianceRenderer::footprint(scene, points.len()))?;
-        let settings = PointSettings { seed, caustics: !self.no_caustics, ..PointSettings::default() };
+        let mut memory = Pages::new(IrradianceRenderer::footprint(scene, points.len(), method))?;
+        let goal = Goal { samples: self.spp.last().copied(), ..Goal::default() };
+        let settings =
+            PointSettings { seed, caustics: !self.no_caustics, method, goal, ..PointSettings::default() };
         let mut arena = Arena::over(&mut memory);
         let structures = (*scene, *bvh, *lights);
         let mut renderer = IrradianceRenderer::over(structures, points, &settings, &mut arena, executor)?;
