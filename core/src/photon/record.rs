@@ -69,6 +69,11 @@ impl Photon {
         Self { power: tag, ..Self::new(position, direction, normal, Rgb::ZERO) }
     }
 
+    /// The tag of a photon made by [`Photon::tagged`].
+    pub fn tag(&self) -> u32 {
+        self.power
+    }
+
     /// This photon with another `power`.
     pub(crate) fn with_power(self, power: Rgb) -> Self {
         let (exponent, mantissas) = shared_exponent(power);
