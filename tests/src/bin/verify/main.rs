@@ -10,6 +10,7 @@ mod layers;
 mod limits;
 mod names;
 mod pages;
+mod python;
 mod quality;
 mod source;
 mod targets;
@@ -67,6 +68,7 @@ const STEPS: &[Step] = &[
     step("docs", "rustdoc without a warning", quality::docs, When::Whole),
     step("targets", "the tiny render on every target: same bits", targets::check, When::Whole),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
+    step("python", "the wheel of the Python package passes its tests", python::check, When::Whole),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
     step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),
 ];
