@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn refusals_name_the_keyword() {
         let refusal = |name: &str, value: &str| parse(&[(name, value)]).err().unwrap().to_string();
-        assert!(refusal("cach_error", "1").contains("`cach_error`\n  help: the settings are size, "));
+        assert!(refusal("cach_error", "1").contains("`cach_error`\n  help: the settings are "));
         assert_eq!(refusal("spp", "0"), "spp=0: samples per pixel are a number from 1 to 2^30");
         assert!(refusal("reuse", "maybe").starts_with("reuse=maybe: expected one of auto, on, off"));
         assert!(refusal("shard", "1/4").contains("checkpoint"));
