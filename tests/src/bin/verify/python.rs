@@ -15,7 +15,7 @@ const MAX_WHEEL: u64 = 6 << 20;
 /// What the environment has: the builder, and what the tests need.
 const TOOLS: &str = "maturin>=1.9,<2 numpy pytest mypy nbclient ipykernel";
 
-/// Builds the wheel with the crates and in the folder of the other steps, and runs pytest.
+/// Builds the wheel and runs pytest. The package shares the folder of products with the root workspace.
 pub(crate) fn check(project: &Project) -> Outcome {
     let mut probe = command(&project.root, "python3 -c");
     let probe = probe.arg("import venv, ensurepip").stderr(Stdio::null());
@@ -38,7 +38,7 @@ pub(crate) fn check(project: &Project) -> Outcome {
 
     let line = format!("{} build --quiet --profile quick --locked --out", tool("maturin"));
     let mut build = fresh_cargo(&package, &line);
-    run(build.arg(&wheels).env("CARGO_TARGET_DIR", &target))?;
+    run(build.arg(&wheels))?;
     let wheel = only_wheel(&wheels)?;
     let bytes = fs::metadata(&wheel).map_or(0, |wheel| wheel.len());
     if bytes > MAX_WHEEL {
