@@ -36,7 +36,8 @@ pub(crate) fn check(project: &Project) -> Outcome {
     let install = |what: &[String]| run(command(&package, &format!("{} {pip}", tool("python"))).args(what));
     install(&TOOLS.split(' ').map(str::to_owned).collect::<Vec<_>>())?;
 
-    let line = format!("{} build --quiet --profile quick --locked --out", tool("maturin"));
+    let line =
+        format!("{} build --quiet --profile quick --locked --compression-level 9 --out", tool("maturin"));
     let mut build = fresh_cargo(&package, &line);
     run(build.arg(&wheels))?;
     let wheel = only_wheel(&wheels)?;
