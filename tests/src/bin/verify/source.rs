@@ -54,7 +54,7 @@ const RULES: &[Rule] = &[
         because: "only simd/ may be unsafe",
     },
     Rule {
-        folders: &["std-app/src", "std-app/bindings"],
+        folders: &["std-app/src", "std-app/bindings/python/src"],
         words: &["print!(", "println!("],
         unless: &[],
         because: "it panics where nobody reads; std-app/src/cli/stdio.rs does not",
