@@ -48,8 +48,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
+// The command line names the library as other programs do.
+extern crate self as halflight;
+
 pub mod bake;
 mod cgroup;
+pub mod cli;
 pub mod compare;
 mod error;
 mod file_error;

@@ -1,17 +1,23 @@
 //! Renderer of a loaded scene: one build for many views.
 
-use crate::bake::{BakeSettings, Baked, Sensor};
+use crate::bake::{BakeProgress, BakeSettings, Baked, Sensor};
 use crate::error::Error;
 use crate::load::{self, LoadOptions, LoadedScene, SceneViews, View};
 use crate::render::{
     Built, BuiltMemory, Pool, Progress, RenderError, RenderResult, Request, Settings, with_points,
 };
 use core::sync::atomic::AtomicBool;
+use halflight_core::bvh::Coherence;
+use halflight_core::geometry::{Hit, Ray};
 pub use halflight_core::scene::Camera;
 use halflight_core::{IrradiancePoint, Level};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Rays that a thread traces together.
+const RAYS: usize = 4096;
 
 /// A loaded scene with its hierarchy, its lights and its threads. Renders of several views share them, also
 /// at the same time from several threads.
@@ -142,11 +148,52 @@ impl Renderer {
     /// # Errors
     /// Those of [`crate::bake::irradiance`].
     pub fn irradiance(&self, points: &[IrradiancePoint], settings: &BakeSettings) -> Result<Baked, Error> {
+        self.irradiance_with(points, settings, &mut |_| {}, &AtomicBool::new(false))
+    }
+
+    /// As [`Renderer::irradiance`], until a rule of `settings.stop` holds or `interrupt` is raised. The
+    /// calling thread calls `progress` after each round.
+    ///
+    /// # Errors
+    /// Those of [`crate::bake::irradiance`].
+    pub fn irradiance_with(
+        &self,
+        points: &[IrradiancePoint],
+        settings: &BakeSettings,
+        progress: &mut dyn FnMut(&BakeProgress),
+        interrupt: &AtomicBool,
+    ) -> Result<Baked, Error> {
         let OfScene { views, built } = self.scene.borrow_dependent();
         let scene = views.scene(self.scene().camera_or_default());
         let pool = self.pool(settings.threads)?;
-        let never = AtomicBool::new(false);
-        Ok(with_points((&scene, built), (points, settings), &pool, &mut |_| {}, &never)?)
+        Ok(with_points((&scene, built), (points, settings), &pool, progress, interrupt)?)
+    }
+
+    /// The nearest hits of rays in the coordinates of the core ([`LoadedScene::transform`]), on all threads;
+    /// triangles are those of [`LoadedScene::triangles`].
+    ///
+    /// # Errors
+    /// No threads.
+    pub fn nearest(&self, rays: &[Ray]) -> Result<Vec<Hit>, Error> {
+        let bvh = self.scene.borrow_dependent().built.bvh();
+        let mut hits = vec![Hit::NONE; rays.len()];
+        let trace = |(rays, hits): (&[Ray], &mut [Hit])| {
+            bvh.nearest_batch(Level::detect(), rays, Coherence::Incoherent, hits);
+        };
+        self.pool(None)?.install(|| rays.par_chunks(RAYS).zip(hits.par_chunks_mut(RAYS)).for_each(trace));
+        Ok(hits)
+    }
+
+    /// For each ray 1 if it hits anything, else 0; coordinates as of [`Renderer::nearest`].
+    ///
+    /// # Errors
+    /// No threads.
+    pub fn occluded(&self, rays: &[Ray]) -> Result<Vec<u8>, Error> {
+        let bvh = self.scene.borrow_dependent().built.bvh();
+        let mut hidden = vec![0; rays.len()];
+        let trace = |(rays, hidden): (&[Ray], &mut [u8])| bvh.occluded_batch(Level::detect(), rays, hidden);
+        self.pool(None)?.install(|| rays.par_chunks(RAYS).zip(hidden.par_chunks_mut(RAYS)).for_each(trace));
+        Ok(hidden)
     }
 
     /// The pool of so many threads.

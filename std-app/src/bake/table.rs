@@ -33,7 +33,7 @@ impl Quantity {
     }
 
     /// Value, lower and upper end of its interval, and R, G, B.
-    fn of(self, point: &PointIrradiance) -> ([f32; 3], Rgb) {
+    pub fn of(self, point: &PointIrradiance) -> ([f32; 3], Rgb) {
         let scaled = |scale: f32| [point.value(), point.lower, point.upper].map(|value| value * scale);
         match self {
             Quantity::Irradiance => (scaled(1.0), point.irradiance),

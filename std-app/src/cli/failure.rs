@@ -18,6 +18,11 @@ impl Failure {
     pub(super) fn advice(self, advice: impl fmt::Display) -> Self {
         Self { advice: Some(advice.to_string()), ..self }
     }
+
+    /// Reason and advice, which may be empty.
+    pub(super) fn into_parts(self) -> (String, String) {
+        (self.reason, self.advice.unwrap_or_default())
+    }
 }
 
 impl fmt::Display for Failure {

@@ -17,10 +17,12 @@ use halflight::layers::{Facts, LayerSource};
 use halflight::load::{self, LoadedScene};
 use halflight::render::{self, Ending, Progress, Settings, Shard, Stop};
 use halflight::report::{Provenance, Run};
-use halflight::save::ExrFile;
+use halflight::save::{ExrFile, Image};
 use halflight::values::{Samples, TargetError};
+use halflight_core::scene::Camera;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Render a scene to pictures
@@ -110,24 +112,12 @@ impl Render {
         loaded.repairs.iter().for_each(print_note);
         let (stop, by_default) = self.stop(&loaded)?;
         let views = loaded.views();
-        let scene = views.scene(self.picture.camera.camera(&loaded)?);
+        let scene = views.scene(self.camera(&loaded)?);
         let (stop, by_default) = match note_darkness(&scene) {
             true => (Stop { spp: stop.spp.or(Some(1)), ..stop }, false),
             false => (stop, by_default),
         };
-        let settings = self.picture.settings(&loaded, self.method, &self.method_args, stop, reference)?;
-        let window = self.crop.shard([settings.width, settings.height])?;
-        let settings = Settings {
-            shard: self.shard.or(window).unwrap_or(Shard::WHOLE),
-            checkpoint: self.checkpoint.checkpoint(),
-            resume: self.checkpoint.resume(),
-            load_cache: self.load_cache.clone(),
-            save_cache: self.save_cache.clone(),
-            layers: self.layers.settings(&loaded),
-            survey: self.report.is_some().then_some(SURVEY_POINTS),
-            photon_view: self.report.is_some(),
-            ..settings
-        };
+        let settings = self.settings(&loaded, stop, reference)?;
 
         interrupt::install_handler()?;
         let (mut reporter, mut live) = (ProgressReporter::new(), self.live.live(&self.view));
@@ -182,6 +172,33 @@ impl Render {
         Ok(outputs.end(&results, code))
     }
 
+    /// Settings of the flags, completed by those of the scene file.
+    pub(super) fn settings(
+        &self,
+        loaded: &LoadedScene,
+        stop: Stop,
+        reference: Option<Arc<Image>>,
+    ) -> Result<Settings, Failure> {
+        let settings = self.picture.settings(loaded, self.method, &self.method_args, stop, reference)?;
+        let window = self.crop.shard([settings.width, settings.height])?;
+        Ok(Settings {
+            shard: self.shard.or(window).unwrap_or(Shard::WHOLE),
+            checkpoint: self.checkpoint.checkpoint(),
+            resume: self.checkpoint.resume(),
+            load_cache: self.load_cache.clone(),
+            save_cache: self.save_cache.clone(),
+            survey: self.report.is_some().then_some(SURVEY_POINTS),
+            layers: self.layers.settings(loaded),
+            photon_view: self.report.is_some(),
+            ..settings
+        })
+    }
+
+    /// Camera of the flags, completed by that of the scene file.
+    pub(super) fn camera(&self, loaded: &LoadedScene) -> Result<Camera, Failure> {
+        self.picture.camera.camera(loaded)
+    }
+
     /// Checked outputs. The files of the scene are not known yet.
     fn outputs(&self, role: Role, pictures: &[PathBuf]) -> Result<Outputs, Failure> {
         let mut outputs = Outputs::new(self.json);
@@ -211,7 +228,7 @@ impl Render {
     }
 
     /// When to stop, and whether that is the default: neither flags nor scene file have a rule.
-    fn stop(&self, loaded: &LoadedScene) -> Result<(Stop, bool), Failure> {
+    pub(super) fn stop(&self, loaded: &LoadedScene) -> Result<(Stop, bool), Failure> {
         let file = &loaded.settings;
         let stop = |spp: Option<Samples>, seconds, error: Option<TargetError>| Stop {
             spp: spp.map(u32::from),

@@ -78,6 +78,11 @@ impl<'a> Built<'a> {
         Ok(())
     }
 
+    /// The hierarchy.
+    pub(crate) fn bvh(&self) -> &Bvh<'a> {
+        &self.bvh
+    }
+
     /// Seconds of building.
     pub(crate) fn seconds(&self) -> f64 {
         self.seconds

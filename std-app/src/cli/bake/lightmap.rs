@@ -1,9 +1,9 @@
 //! Lightmaps by `halflight bake`.
 
 use super::{Bake, check_outputs, code, memory};
-use crate::failure::Failure;
-use crate::outputs::{Outputs, Role};
-use crate::{print_note, values};
+use crate::cli::failure::Failure;
+use crate::cli::outputs::{Outputs, Role};
+use crate::cli::{print_note, values};
 use clap::Args;
 use halflight::bake::{Lightmap, LightmapSettings, Texel, check_format};
 use halflight::load::LoadOptions;

@@ -1,9 +1,9 @@
 //! Grids of light probes by `halflight bake`.
 
 use super::{Bake, check_outputs, code, memory};
-use crate::failure::Failure;
-use crate::outputs::{Outputs, Role};
-use crate::values;
+use crate::cli::failure::Failure;
+use crate::cli::outputs::{Outputs, Role};
+use crate::cli::values;
 use clap::Args;
 use halflight::bake::{ProbeFormat, ProbeGrid, ProbeSettings, write_probes};
 use halflight::load::LoadOptions;

@@ -47,8 +47,8 @@ const TRANSPORT: &[&str] = &[
 /// Folder of the core.
 const CORE: &str = "core/src";
 
-/// Roots of crates that are checked, each before those that contain it.
-pub(crate) const ROOTS: [&str; 3] = [CORE, "std-app/src/cli", "std-app/src"];
+/// Roots of crates that are checked.
+pub(crate) const ROOTS: [&str; 2] = [CORE, "std-app/src"];
 
 /// A file of a crate: its path below that folder, and its numbered lines of code.
 pub(crate) struct Source<'t> {

@@ -11,6 +11,7 @@ mod layers;
 mod limits;
 mod names;
 mod pages;
+mod python;
 mod quality;
 mod source;
 mod targets;
@@ -70,6 +71,7 @@ const STEPS: &[Step] = &[
     step("c", "programs in C and C++ call the library", bindings::c, When::Whole),
     step("web", "the module for browsers: bits, types, its page", bindings::web, When::Whole),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
+    step("python", "the wheel of the Python package passes its tests", python::check, When::Whole),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
     step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),
 ];

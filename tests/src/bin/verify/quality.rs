@@ -4,7 +4,7 @@ use crate::command::{command, run, run_with_report};
 use crate::{Outcome, Project};
 
 /// Directories with their own workspace.
-const WORKSPACES: &[&str] = &[".", "tests/targets", "fuzz", "core/bindings/c"];
+const WORKSPACES: &[&str] = &[".", "tests/targets", "fuzz", "core/bindings/c", "std-app/bindings/python"];
 
 /// Clippy selections: directory and arguments. The main workspace uses the profile of tests, to share
 /// compiled macros and build scripts.
@@ -14,6 +14,7 @@ const CLIPPY: &[(&str, &str)] = &[
     (".", "--profile quick -p halflight-core -p halflight-simd --lib"),
     ("tests/targets", "-p tiny -p host"),
     ("fuzz", "--no-default-features --features app --lib --bins"),
+    ("std-app/bindings/python", "--profile quick"),
 ];
 
 pub(crate) fn fmt(project: &Project) -> Outcome {

@@ -40,13 +40,21 @@ const RULES: &[Rule] = &[
         because: "core and simd have neither std nor alloc",
     },
     Rule {
-        folders: &["core/src", "std-app/src", "tests/src", "tests/tests", "tests/lab/src", "tests/support"],
+        folders: &[
+            "core/src",
+            "std-app/src",
+            "std-app/bindings",
+            "tests/src",
+            "tests/tests",
+            "tests/lab/src",
+            "tests/support",
+        ],
         words: &["unsafe ", "unsafe{"],
         unless: &["\"unsafe"],
         because: "only simd/ may be unsafe",
     },
     Rule {
-        folders: &["std-app/src"],
+        folders: &["std-app/src", "std-app/bindings/python/src"],
         words: &["print!(", "println!("],
         unless: &[],
         because: "it panics where nobody reads; std-app/src/cli/stdio.rs does not",

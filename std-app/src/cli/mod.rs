@@ -1,6 +1,5 @@
 //! The command line: commands, their exit codes and internal errors. `halflight --help` lists its flags,
 //! docs/cli.md its interface for scripts.
-#![forbid(unsafe_code)]
 
 mod bake;
 mod bake_parts;
@@ -11,6 +10,7 @@ mod crop_args;
 mod failure;
 mod info;
 mod interrupt;
+mod keywords;
 mod layer_args;
 mod live_args;
 mod manual;
@@ -26,11 +26,14 @@ mod summary;
 mod values;
 mod view_args;
 
+pub use keywords::{Keywords, Refused};
+
 use clap::{CommandFactory, Parser, Subcommand};
 use failure::Failure;
 use halflight::memory::Budget;
 use halflight::pool::in_pool;
 use halflight::save::{self, Image};
+use std::ffi::OsString;
 use std::io::{Write, stdout};
 use std::panic;
 use std::path::Path;
@@ -82,11 +85,12 @@ impl Command {
     }
 }
 
-/// Runs the program. Exit codes are a contract (docs/cli.md).
-fn main() -> ExitCode {
+/// Runs the program with the words of a command line, whose first is its name. It handles signals of the
+/// process. Exit codes are a contract (docs/cli.md).
+pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::block_signals();
     panic::set_hook(Box::new(|panic| print_message(format_args!("internal error of halflight: {panic}"))));
-    let command = match Cli::try_parse() {
+    let command = match Cli::try_parse_from(words) {
         Ok(cli) => cli.command,
         Err(message) => return end_with(&message),
     };
