@@ -9,8 +9,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 /// The version of three.js whose layouts the pages rely on.
 pub(crate) const THREE: &str = "three@0.187.0";
 
-/// The folder of a package, as `name@version`, which npm fetches into the folder of builds once; without npm a
-/// message that the test is skipped.
+/// The folder of a package, as `name@version`, which npm fetches into the folder of builds once; without npm
+/// a message that the test is skipped.
 pub(crate) fn package(name: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target").join(name);
     let package = folder.join("package");

@@ -1,6 +1,6 @@
-//! The page of core/bindings/wasm in a real browser: pictures by all workers have the bits of one instance, files
-//! are opened, vertices baked, nothing fails, and people with assistive tools can use it. `cargo verify web`
-//! builds the module and runs it.
+//! The page of core/bindings/wasm in a real browser: pictures by all workers have the bits of one instance,
+//! files are opened, vertices baked, nothing fails, and people with assistive tools can use it. `cargo verify
+//! web` builds the module and runs it.
 
 use crate::browser::{Folder, browser};
 use crate::server::{THREE, package, serve};
@@ -46,19 +46,25 @@ console.error = (...parts) => note('error', parts.join(' '));
         note('serious', serious.map(({ id, nodes }) => `${id}: ${nodes[0].html}`).join('; '));
 
         const baked = await bake({ samples: 16 });
-        note('baked', baked.irradiance.some((value) => value > 0) && !document.getElementById('baked').hidden);
+        const isShown = !document.getElementById('baked').hidden;
+        note('baked', baked.irradiance.some((value) => value > 0) && isShown);
         note('intervals', baked.lower.every((low, i) => low <= baked.upper[i]));
 
         const file = (name, text) => new File([text], name);
         await open([
             file('room.obj', ['mtllib room.mtl', 'v -1 0 -1', 'v 1 0 -1', 'v 1 0 1', 'v -1 0 1', 'v -1 2 -1',
-                'v 1 2 -1', 'v 1 2 1', 'v -1 2 1', 'usemtl floor', 'f 4 3 2 1', 'usemtl lamp', 'f 5 6 7 8', ''].join('\n')),
-            file('room.mtl', ['newmtl floor', 'Kd 0.5 0.5 0.5', 'newmtl lamp', 'Kd 0 0 0', 'Ke 1 1 1', ''].join('\n')),
+                'v 1 2 -1', 'v 1 2 1', 'v -1 2 1', 'usemtl floor', 'f 4 3 2 1', 'usemtl lamp', 'f 5 6 7 8',
+                '',
+            ].join('\n')),
+            file('room.mtl', ['newmtl floor', 'Kd 0.5 0.5 0.5', 'newmtl lamp', 'Kd 0 0 0', 'Ke 1 1 1', '',
+                '',
+            ].join('\n')),
         ]);
         note('triangles', page.description.triangles.length / 3);
         await render({ samples: 4, error: 0 });
         note('floor', page.state.picture.some((value) => value > 0));
-        await open([file('none.txt', '')]).then(() => note('refused', 'no'), (error) => note('refused', error.message));
+        const refused = (error) => note('refused', error.message);
+        await open([file('none.txt', '')]).then(() => note('refused', 'no'), refused);
     } catch (error) {
         note('error', error.stack ?? error);
     }

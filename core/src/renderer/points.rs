@@ -4,6 +4,7 @@ mod audit;
 mod film;
 mod layout;
 mod memory;
+mod stop_rule;
 mod structures;
 mod value;
 
@@ -13,9 +14,9 @@ pub use value::{PointIrradiance, PointSettings};
 use super::build::{All, Build, DiffuseTextured, Opaque, build_for, of_build};
 use super::{RenderError, Until};
 use crate::bvh::Bvh;
-use crate::film::{Dropped, PIXELS_PER_TILE, Pixel};
+use crate::film::{Dropped, Pixel};
 use crate::findings::Findings;
-use crate::light::{LightSampler, luminance};
+use crate::light::LightSampler;
 use crate::memory::{Arena, Buffer, OutOfMemory};
 use crate::method::{
     Executor, IrradiancePoints, PilotSize, PointMethod, RenderContext, RenderState, Round, WantedIrradiance,
@@ -23,19 +24,12 @@ use crate::method::{
 use crate::scene::Scene;
 use crate::transport::{Counters, IrradiancePoint, PathSettings, UNLIMITED};
 use audit::{Bias, PointAudit};
-use film::OFFSET;
 use layout::{Layout, number_of, order_along_curve};
-use libm::{ceil, fmin, sqrt};
+use stop_rule::FIRST_DECISION;
 use structures::{method_of, structures};
 
 /// Samples of a tile between two questions whether the executor is over.
 const STEP: u32 = 16;
-
-/// Samples at which the intervals of a tile are first judged.
-const FIRST_DECISION: u32 = 64;
-
-/// Fraction of the points of a finished tile whose intervals are within the error.
-const WITHIN: f64 = 0.95;
 
 /// Points of a task that prepares points.
 const CHUNK: usize = 1024;
@@ -334,68 +328,6 @@ impl<'a> IrradianceRenderer<'a> {
             }
         })
     }
-
-    /// Adds samples to the tiles that have not reached `error`, until all have or have `most` samples. Tiles
-    /// are judged at numbers of samples of their own, so that the steps are of no matter.
-    fn sample_within(
-        &mut self,
-        (error, most): (f64, u32),
-        executor: &mut impl Executor,
-    ) -> Result<(), OutOfMemory> {
-        self.aim_at(error);
-        let is_open = |finished: &[u8], tile: usize| finished.get(tile) == Some(&0);
-        while !executor.is_over() && self.has_open_tiles() {
-            let (target, is_decision) = (most.min(self.decision), self.decision <= most);
-            self.sample(executor, target, is_open)?;
-            if executor.is_over() || !is_decision {
-                return Ok(());
-            }
-            if self.estimate(executor, target) {
-                continue;
-            }
-            self.finish_tiles(error as f32);
-            if target == MOST_SAMPLES {
-                return Ok(());
-            }
-            self.decision = next_decision(target);
-        }
-        Ok(())
-    }
-
-    /// Opens all tiles where `error` is another than before.
-    fn aim_at(&mut self, error: f64) {
-        if self.error != error {
-            self.finished.fill(0);
-            self.error = error;
-            let samples = self.film.state.samples.iter().copied().max().unwrap_or_default();
-            self.decision = FIRST_DECISION;
-            while self.decision < samples {
-                self.decision = next_decision(self.decision);
-            }
-        }
-    }
-
-    /// True if a tile of the shard has not reached the error.
-    fn has_open_tiles(&self) -> bool {
-        let shard = self.film.state.shard;
-        self.finished.iter().enumerate().any(|(tile, finished)| *finished == 0 && shard.owns(tile))
-    }
-
-    /// Marks the tiles in which enough points are within `error`.
-    fn finish_tiles(&mut self, error: f32) {
-        let PointFilm { layout, ref state, ref half_widths, .. } = self.film;
-        let pixels = &state.film.pixels()[..layout.pixels()];
-        let offset = OFFSET * self.film.mean() as f32;
-        let tiles = pixels.chunks(PIXELS_PER_TILE).zip(half_widths.chunks(PIXELS_PER_TILE));
-        for ((pixels, half_widths), finished) in tiles.zip(self.finished.iter_mut()) {
-            // Replicates of a point average their noise.
-            let each = libm::sqrtf(layout.replicates as f32);
-            let is_within =
-                |(pixel, half): (&Pixel, &f32)| *half <= each * error * (luminance(pixel.mean()) + offset);
-            let within = pixels.iter().zip(half_widths).filter(|pair| is_within(*pair)).count();
-            *finished |= u8::from(within as f64 >= WITHIN * pixels.len() as f64);
-        }
-    }
 }
 
 /// # Errors
@@ -405,11 +337,6 @@ fn check_number(points: &[IrradiancePoint]) -> Result<(), RenderError> {
         true => Ok(()),
         false => Err(RenderError::Points),
     }
-}
-
-/// Samples at which tiles are judged after `samples`.
-fn next_decision(samples: u32) -> u32 {
-    fmin(ceil(f64::from(samples) * sqrt(2.0)), f64::from(MOST_SAMPLES)) as u32
 }
 
 #[cfg(test)]

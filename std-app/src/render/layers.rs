@@ -1,10 +1,10 @@
 //! Layers of a picture: their names, and the search of surfaces that fills those of surfaces.
 
 use super::RenderError;
-use super::image::values_in_window;
 use super::memory::Memory;
 use super::setup::RenderSetup;
 use super::threads::Threads;
+use super::window::values_in_window;
 use crate::save::Image;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Footprint};

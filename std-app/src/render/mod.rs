@@ -31,6 +31,7 @@ mod run;
 mod setup;
 mod survey;
 mod threads;
+mod window;
 
 pub(crate) use built::{Built, BuiltMemory};
 pub use error::{FileError, RenderError};
