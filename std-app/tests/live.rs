@@ -182,7 +182,7 @@ fn a_continued_render_goes_on_where_its_file_is() {
         std::fs::read(folder.path("whole.pfm")).unwrap() == std::fs::read(folder.path("part.pfm")).unwrap()
     );
     let said = folder.refused("render scene.obj --spp 4 -o part.pfm --shard 1/2");
-    assert!(said.contains("--shard has no checkpoint"), "{said}");
+    assert!(said.contains("--checkpoint <FILE>|--continue <FILE>"), "{said}");
 }
 
 #[test]

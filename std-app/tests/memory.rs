@@ -129,11 +129,15 @@ fn texts_say_what_they_take_before_they_take_it() {
     write(&folder, "scene.mtl", "newmtl floor\n".repeat(60_000));
     let words = said(&folder, "render scene.obj --memory 32M --threads 1 --size 8x8 --spp 1 -o out.pfm", 0);
     assert!(words.contains("scene.mtl") && words.contains("left out"), "{words}");
-    // One mesh in many places.
+    // One mesh in many places, in the memory of one or with triangles of its own in each.
     write(&folder, "grid.obj", square.to_string() + &"f 1 2 3\n".repeat(2_000));
-    write(&folder, "many.toml", "[[mesh]]\nfile = \"grid.obj\"\n".repeat(3_000));
-    let words = said(&folder, "render many.toml --memory 48M --threads 1 --size 8x8 --spp 1 -o out.pfm", 2);
-    assert!(words.contains("memory"), "{words}");
+    let many = "[[mesh]]\nfile = \"grid.obj\"\n";
+    for (mesh, code) in [(many.into(), 0), (format!("{many}share = false\n"), 2)] {
+        write(&folder, "many.toml", mesh.repeat(3_000));
+        let arguments = "render many.toml --memory 48M --threads 1 --size 8x8 --spp 1 -o out.pfm";
+        let words = said(&folder, arguments, code);
+        assert!(code == 0 || words.contains("memory"), "{words}");
+    }
 }
 
 /// A sealed file with `from` in its header replaced by `to`.

@@ -13,7 +13,7 @@ pub(super) struct BakeParts {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     /// Estimate every Nth tile of 256 near points from the Ith on, into the file of --checkpoint; needs --spp
-    #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "spp",
+    #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "kept", requires = "spp",
         conflicts_with_all = ["time", "error"], help_heading = "Parts")]
     shard: Option<Shard>,
 }
@@ -26,7 +26,7 @@ impl BakeParts {
 
     /// Plans the file, and protects the one to be resumed.
     pub(super) fn plan(&self, outputs: &mut Outputs) -> Result<(), Failure> {
-        self.checkpoint.plan(outputs, self.shard.is_some())?;
+        self.checkpoint.plan(outputs)?;
         self.checkpoint.protect(outputs)
     }
 

@@ -10,31 +10,30 @@ use std::path::PathBuf;
 #[derive(Args)]
 pub(super) struct CheckpointArgs {
     /// Keep the samples in a file during the work, for --resume and `halflight merge`
-    #[arg(long, value_name = "FILE", help_heading = "Parts")]
+    #[arg(long, value_name = "FILE", group = "kept", help_heading = "Parts")]
     checkpoint: Option<PathBuf>,
     /// Interval between checkpoints; the last one is written at the end [default: 60s]
-    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Parts")]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, requires = "kept",
+        help_heading = "Parts")]
     checkpoint_every: Option<f64>,
     /// Continue the file of a checkpoint, with the same flags except --spp, --time and --error
     #[arg(long, value_name = "FILE", help_heading = "Parts")]
     resume: Option<PathBuf>,
     /// Keep the samples in a file as --checkpoint does, and continue it as --resume does if it exists
-    #[arg(long = "continue", value_name = "FILE", conflicts_with_all = ["checkpoint", "resume"],
-        help_heading = "Parts")]
+    #[arg(
+        long = "continue",
+        value_name = "FILE",
+        group = "kept",
+        conflicts_with = "resume",
+        help_heading = "Parts"
+    )]
     continued: Option<PathBuf>,
 }
 
 impl CheckpointArgs {
-    /// Plans the file, which a shard needs.
-    pub(super) fn plan(&self, outputs: &mut Outputs, is_shard: bool) -> Result<(), Failure> {
-        let flag =
-            if is_shard { Some("--shard") } else { self.checkpoint_every.map(|_| "--checkpoint-every") };
-        match (self.written(), flag) {
-            (Some(file), _) => outputs.plan(Role::Checkpoint, file),
-            (None, None) => Ok(()),
-            (None, Some(flag)) => Err(Failure::new(format!("{flag} has no checkpoint"))
-                .advice("add --checkpoint FILE, or --continue FILE")),
-        }
+    /// Plans the file.
+    pub(super) fn plan(&self, outputs: &mut Outputs) -> Result<(), Failure> {
+        self.written().map_or(Ok(()), |file| outputs.plan(Role::Checkpoint, file))
     }
 
     /// Protects the file to be continued.

@@ -67,7 +67,7 @@ pub(super) struct Render {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     /// Render every Nth tile from the Ith on into the film of --checkpoint; a picture only with -o
-    #[arg(long, value_name = "I/N", value_parser = values::shard,
+    #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "kept",
         conflicts_with_all = ["time", "error"], help_heading = "Parts")]
     shard: Option<Shard>,
     #[command(flatten)]
@@ -203,7 +203,7 @@ impl Render {
     fn outputs(&self, role: Role, pictures: &[PathBuf]) -> Result<Outputs, Failure> {
         let mut outputs = Outputs::new(self.json);
         pictures.iter().try_for_each(|picture| outputs.plan(role, picture))?;
-        self.checkpoint.plan(&mut outputs, self.shard.is_some())?;
+        self.checkpoint.plan(&mut outputs)?;
         self.live.plan(&mut outputs)?;
         self.save_cache.iter().try_for_each(|cache| outputs.plan(Role::Cache, cache))?;
         self.report.iter().try_for_each(|folder| outputs.plan_report(folder))?;

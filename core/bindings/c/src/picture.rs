@@ -192,7 +192,7 @@ pub unsafe extern "C" fn halflight_renderer_take(
         if shard >= shards || pixels.len() != renderer.renderer.film().pixels().len() {
             return Err(HalflightStatus::Setting);
         }
-        renderer.renderer.take_tiles(Shard { index: shard, count: shards }, pixels, samples);
+        renderer.renderer.take_tiles(Shard::part(shard, shards), pixels, samples);
         Ok(())
     }))
 }

@@ -199,8 +199,12 @@ impl HalflightSceneDescription {
         }
         let radiance = Vec3::from(self.environment);
         let map = texture_id(self.environment_texture);
-        let environment =
-            (radiance.max_element() > 0.0).then_some(Environment { radiance, map, to_map: Mat3::IDENTITY });
+        let environment = (radiance.max_element() > 0.0).then_some(Environment {
+            radiance,
+            map,
+            to_map: Mat3::IDENTITY,
+            disc: None,
+        });
         let camera = self.camera.of_core();
         Ok(Scene { mesh, materials, textures, lights, environment, camera })
     }

@@ -61,7 +61,7 @@ impl HalflightSettings {
             seed: self.seed,
             max_depth: (self.max_depth > 0).then_some(self.max_depth),
             level: level(self.precise),
-            shard: Shard { index: self.shard, count: self.shards.max(1) },
+            shard: Shard::part(self.shard, self.shards.max(1)),
             reconstruct: if self.reconstruct { Reconstruct::Auto } else { Reconstruct::Off },
             ..Settings::new([self.width, self.height]).with_method(*method)
         })

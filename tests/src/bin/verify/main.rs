@@ -37,10 +37,15 @@ enum When {
     Whole,
     /// The quick run; the full run has a step that includes this one.
     Quick,
+    /// The run of the interfaces for other languages, which need compilers and browsers of their own.
+    Bindings,
 }
 
 /// The name of all quick steps.
 const QUICK: &str = "quick";
+
+/// The name of all steps of the interfaces for other languages.
+const BINDINGS: &str = "bindings";
 
 /// Summary of a step in one line, or why it failed.
 type Outcome = Result<String, Failure>;
@@ -68,10 +73,10 @@ const STEPS: &[Step] = &[
     step("doors", "public names of the core are those of core/doors.txt", doors::check, When::Whole),
     step("docs", "rustdoc without a warning", quality::docs, When::Whole),
     step("targets", "the tiny render on every target: same bits", targets::check, When::Whole),
-    step("c", "programs in C and C++ call the library", bindings::c, When::Whole),
-    step("web", "the module for browsers: bits, types, its page", bindings::web, When::Whole),
+    step("c", "programs in C and C++ call the library", bindings::c, When::Bindings),
+    step("web", "the module for browsers: bits, types, its page", bindings::web, When::Bindings),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
-    step("python", "the wheel of the Python package passes its tests", python::check, When::Whole),
+    step("python", "the wheel of the Python package passes its tests", python::check, When::Bindings),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
     step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),
 ];
@@ -95,7 +100,9 @@ fn main() -> ExitCode {
                 }
             },
             "--allow-missing" => allow_missing = true,
-            name if name == QUICK || STEPS.iter().any(|step| step.name == name) => names.push(argument),
+            name if [QUICK, BINDINGS].contains(&name) || STEPS.iter().any(|step| step.name == name) => {
+                names.push(argument)
+            }
             "--help" | "-h" => {
                 println!("{}", usage());
                 return ExitCode::SUCCESS;
@@ -109,12 +116,13 @@ fn main() -> ExitCode {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let project = Project { root: root.canonicalize().unwrap_or(root), fuzz_seconds };
 
-    let is_named = |step: &Step, name: &String| match name == QUICK {
-        true => step.when != When::Whole,
-        false => name == step.name,
+    let is_named = |step: &Step, name: &String| match name.as_str() {
+        QUICK => matches!(step.when, When::Always | When::Quick),
+        BINDINGS => step.when == When::Bindings,
+        name => name == step.name,
     };
     let chosen = STEPS.iter().filter(|step| match names.is_empty() {
-        true => step.when != When::Quick,
+        true => matches!(step.when, When::Always | When::Whole),
         false => names.iter().any(|name| is_named(step, name)),
     });
     let results: Vec<_> = chosen.map(|step| run(step, &project, allow_missing)).collect();
@@ -146,6 +154,7 @@ fn usage() -> String {
         text += &format!("  {:<8} {}\n", step.name, step.what);
     }
     text += &format!("  {QUICK:<8} source, fmt, unit and table: what to run after an edit\n");
+    text += &format!("  {BINDINGS:<8} c, web and python: interfaces for other languages\n");
     text + "\n--allow-missing    a step whose tool is not on this machine is skipped instead of failing\n\
             --fuzz-seconds N   how long each fuzz target runs; 10 if not said, 600 for a campaign"
 }

@@ -24,6 +24,7 @@ pub(crate) fn check(project: &Project) -> Outcome {
         return Err(Failure::Missing(text.to_owned()));
     }
     let package = project.root.join(PACKAGE);
+    run(&mut command(&package, "cargo clippy --quiet --locked --profile quick -- -D warnings"))?;
     let target = project.root.join("target");
     let (venv, wheels) = (target.join("python/venv"), target.join("python/wheels"));
     for folder in [&venv, &wheels] {

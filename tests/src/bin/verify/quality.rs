@@ -14,7 +14,6 @@ const CLIPPY: &[(&str, &str)] = &[
     (".", "--profile quick -p halflight-core -p halflight-simd --lib"),
     ("tests/targets", "-p tiny -p host"),
     ("fuzz", "--no-default-features --features app --lib --bins"),
-    ("std-app/bindings/python", "--profile quick"),
 ];
 
 pub(crate) fn fmt(project: &Project) -> Outcome {
