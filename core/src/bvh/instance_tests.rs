@@ -199,7 +199,7 @@ const ROUNDING: f32 = 8.0 * f32::EPSILON;
 #[test]
 fn rays_find_what_the_surroundings_of_instances_are_sure_of() {
     let mut random = Random(7);
-    let (mut low, mut differences, mut all) = (0, 0, 0);
+    let (mut sure, mut sure_of_copies) = (0, 0);
     for forest in forests() {
         let (mesh, copies) = (forest.mesh(), forest.copies());
         let [mut memory, mut other] = [&mesh, &copies.mesh()].map(|m| lines(Bvh::footprint_of(m).bytes()));
@@ -214,10 +214,9 @@ fn rays_find_what_the_surroundings_of_instances_are_sure_of() {
             let frame = Frame::from_normal(normal);
             let query = ClearanceQuery { place, frame, reach, points, depth: 0.3 * reach };
             let [clearance, of_copies] = [bvh.clearance(&query), of_copies.clearance(&query)];
-            // Both are conservative: a tree finds triangles whose parts come near.
-            all += 1;
-            differences += u32::from(clearance.has_wall != of_copies.has_wall);
-            low += u32::from(!clearance.has_wall);
+            // Both are conservative, each by the boxes of its tree.
+            sure += u32::from(!clearance.has_wall);
+            sure_of_copies += u32::from(!of_copies.has_wall);
             for _ in 0..if clearance.has_wall { 0 } else { 16 } {
                 let local = (2.0 * random.point() - 1.0).with_z(random.unit_f32());
                 let way = reach / 3f32.sqrt() * frame.to_world(local.normalize());
@@ -238,7 +237,7 @@ fn rays_find_what_the_surroundings_of_instances_are_sure_of() {
             }
         }
     }
-    assert!(low > 500 && differences <= all / 50, "{low} {differences} of {all}");
+    assert!(sure > 2000 && 10 * sure >= 9 * sure_of_copies, "{sure} {sure_of_copies}");
 }
 
 #[test]
