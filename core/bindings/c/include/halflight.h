@@ -484,8 +484,8 @@ const void *halflight_renderer_film(const HalflightRenderer *renderer,
                                     size_t *bytes);
 
 // Replaces the tiles of shard `shard` of `shards` by those of another renderer of the same scene and
-// settings but for the shard: the `bytes` bytes of its `film`, and its number of `samples`. The next step judges the
-// error of the whole.
+// settings but for the shard: the `bytes` bytes of its `film`, and its number of `samples`. The next step
+// judges the error of the whole.
 //
 // Requires:
 // `renderer` is one that no one else uses; `film` has `bytes` bytes.
