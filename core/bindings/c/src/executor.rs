@@ -4,9 +4,9 @@ use crate::status::HalflightStatus;
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
 use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use halflight_core::memory::{Arena, OutOfMemory};
+use halflight_core::memory::{ALIGNMENT, Arena, Footprint, OutOfMemory};
 use halflight_core::parts::rays::Serial;
-use halflight_core::{Counters, Executor, Passed, Worker};
+use halflight_core::{Counters, Executor, Passed, RequiredMemory, Worker};
 
 /// Threads of the program at work on a picture or on points. Zeros, or a null pointer, are the calling
 /// thread.
@@ -58,13 +58,20 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
+    /// Bytes of the structures of `memory` and of the working memory of `threads` threads.
+    pub(crate) fn footprint(memory: RequiredMemory, threads: usize) -> Footprint {
+        let threads = threads.max(1);
+        let padding = threads.saturating_mul(ALIGNMENT);
+        Footprint::default().slice::<u8>(memory.with_workers(threads).saturating_add(padding))
+    }
+
     /// Working memory of `threads` threads, `each` bytes of each.
     pub(crate) fn new(
         threads: usize,
         each: usize,
         arena: &mut Arena<'static>,
     ) -> Result<Self, HalflightStatus> {
-        let each = each.next_multiple_of(halflight_core::memory::ALIGNMENT);
+        let each = each.next_multiple_of(ALIGNMENT);
         Ok(Self { bytes: arena.slice(threads.saturating_mul(each))?, each })
     }
 

@@ -7,7 +7,7 @@ use crate::settings::HalflightPointSettings;
 use crate::status::{HalflightStatus, of};
 use core::ffi::c_void;
 use halflight_core::glam::Vec3;
-use halflight_core::memory::{ALIGNMENT, Arena, Footprint};
+use halflight_core::memory::{Arena, Footprint};
 use halflight_core::{IrradiancePoint, IrradianceRenderer, Until};
 
 /// A place with the unit normal of its hemisphere. Points within rounding of a surface are put on it.
@@ -53,9 +53,8 @@ pub unsafe extern "C" fn halflight_irradiance_memory(
     // SAFETY: by the caller.
     let Ok(scene) = (unsafe { shared(scene) }) else { return 0 };
     let memory = IrradianceRenderer::required_memory(&scene.scene, count);
-    let bytes = memory.with_workers(threads.max(1)).saturating_add(threads.max(1) * ALIGNMENT);
     let points = Footprint::default().slice::<IrradiancePoint>(count);
-    bytes_of::<HalflightIrradianceRenderer>(points.slice::<u8>(bytes))
+    bytes_of::<HalflightIrradianceRenderer>(points.and(Scratch::footprint(memory, threads)))
 }
 
 /// Prepares `count` points of `scene` in `bytes` bytes at `memory`. The scene must stay; `points` need not.

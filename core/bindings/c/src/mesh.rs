@@ -34,6 +34,11 @@ pub struct HalflightMesh {
 }
 
 impl HalflightMesh {
+    /// The same without normals and texture coordinates, which rays do not need.
+    pub(crate) fn positions_alone(&self) -> Self {
+        Self { normals: core::ptr::null(), texcoords: core::ptr::null(), ..*self }
+    }
+
     /// Memory of [`HalflightMesh::copied`].
     pub(crate) fn footprint(&self) -> Footprint {
         let normals = if self.normals.is_null() { 0 } else { self.vertices };
@@ -42,7 +47,6 @@ impl HalflightMesh {
             .slice::<[f32; 3]>(self.vertices)
             .slice::<[f32; 3]>(normals)
             .slice::<[f32; 2]>(texcoords)
-            .slice::<[u32; 3]>(self.triangles)
             .slice::<Triangle>(self.triangles)
     }
 
@@ -59,14 +63,15 @@ impl HalflightMesh {
         // SAFETY: by the caller.
         let texcoords =
             unsafe { copied(self.texcoords, count(self.texcoords), self.texcoord_stride, arena) }?;
-        // SAFETY: by the caller.
-        let vertices: &[[u32; 3]] =
-            unsafe { copied(self.triangle_vertices, self.triangles, self.triangle_stride, arena) }?;
+        let vertices =
+            Strided::<[u32; 3]>::new(self.triangle_vertices, self.triangles, self.triangle_stride)?;
         let with_material = if self.triangle_materials.is_null() { 0 } else { self.triangles };
         // SAFETY: by the caller.
         let materials = unsafe { array(self.triangle_materials, with_material) }?;
         let triangles = arena.slice::<Triangle>(self.triangles)?;
-        for (index, (triangle, &vertices)) in triangles.iter_mut().zip(vertices).enumerate() {
+        for (index, triangle) in triangles.iter_mut().enumerate() {
+            // SAFETY: by the caller: `index` is below the number of triangles.
+            let vertices = unsafe { vertices.get(index) };
             *triangle = Triangle { vertices, material: materials.get(index).copied().unwrap_or(0) };
         }
         Ok(Mesh { positions, normals, texcoords, triangles, ..Mesh::default() })

@@ -6,7 +6,7 @@ use crate::scene::HalflightScene;
 use crate::settings::HalflightSettings;
 use crate::status::{HalflightStatus, of};
 use core::ffi::c_void;
-use halflight_core::memory::{ALIGNMENT, Arena, Footprint};
+use halflight_core::memory::Arena;
 use halflight_core::{Method, Pixel, Renderer, Shard, Until};
 
 /// Error of a picture: relMSE, the mean of squared errors over R² + 0.01 m² with m the mean radiance.
@@ -41,8 +41,7 @@ pub unsafe extern "C" fn halflight_renderer_memory(
     let given = unsafe { (|| Ok((&shared(scene)?.scene, shared(settings)?.of_core()?)))() };
     let Ok::<_, HalflightStatus>((scene, settings)) = given else { return 0 };
     let memory = Renderer::required_memory(scene, &settings);
-    let bytes = memory.with_workers(threads.max(1)).saturating_add(threads.max(1) * ALIGNMENT);
-    bytes_of::<HalflightRenderer>(Footprint::default().slice::<u8>(bytes))
+    bytes_of::<HalflightRenderer>(Scratch::footprint(memory, threads))
 }
 
 /// Builds the structures of a picture of `scene` in `bytes` bytes at `memory`, and chooses its method. The

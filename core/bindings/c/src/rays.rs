@@ -54,7 +54,7 @@ pub struct HalflightBvh {
 pub unsafe extern "C" fn halflight_bvh_memory(mesh: *const HalflightMesh) -> usize {
     // SAFETY: by the caller.
     let Ok(mesh) = (unsafe { shared(mesh) }) else { return 0 };
-    bytes_of::<HalflightBvh>(mesh.footprint().and(Bvh::footprint(mesh.triangles)))
+    bytes_of::<HalflightBvh>(mesh.positions_alone().footprint().and(Bvh::footprint(mesh.triangles)))
 }
 
 /// Builds the hierarchy of `mesh` in `bytes` bytes at `memory`. It keeps nothing of the mesh: its arrays may
@@ -71,7 +71,7 @@ pub unsafe extern "C" fn halflight_bvh_build(
 ) -> HalflightStatus {
     let make = |arena: &mut halflight_core::Arena<'static>| {
         // SAFETY: by the caller.
-        let mesh = unsafe { shared(mesh)?.copied(arena) }?;
+        let mesh = unsafe { shared(mesh)?.positions_alone().copied(arena) }?;
         mesh.validate(usize::MAX).map_err(|_| HalflightStatus::Triangle)?;
         let level = Level::detect();
         Ok(HalflightBvh {

@@ -4,7 +4,7 @@ use crate::memory::{array, bytes_of, place, shared};
 use crate::mesh::HalflightMesh;
 use crate::status::{HalflightStatus, of};
 use core::ffi::c_void;
-use halflight_core::glam::{Mat3, Vec3};
+use halflight_core::glam::Vec3;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::scene::{
     Camera, ColorInput, Environment, Material, PointLight, ScalarInput, Scene, Surface, Texels, Texture,
@@ -199,12 +199,8 @@ impl HalflightSceneDescription {
         }
         let radiance = Vec3::from(self.environment);
         let map = texture_id(self.environment_texture);
-        let environment = (radiance.max_element() > 0.0).then_some(Environment {
-            radiance,
-            map,
-            to_map: Mat3::IDENTITY,
-            disc: None,
-        });
+        let environment =
+            (radiance.max_element() > 0.0).then_some(Environment { map, ..Environment::uniform(radiance) });
         let camera = self.camera.of_core();
         Ok(Scene { mesh, materials, textures, lights, environment, camera })
     }

@@ -15,7 +15,7 @@ const PROGRAMS: [(&str, &[&str]); 2] = [
             "ray 2: nothing, occluded 0",
         ],
     ),
-    // Of the lattice: (4, 5, 9), (5, 5, 9) and (4, 6, 9).
+    // The points (4, 5, 9), (5, 5, 9) and (4, 6, 9) of the lattice.
     (
         "nearest",
         &[
