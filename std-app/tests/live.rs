@@ -165,6 +165,10 @@ fn a_quiet_render_prints_errors_alone() {
     let output = folder.run(&format!("{RENDER} --spp 4 -q"));
     assert!(output.status.success() && output.stderr.is_empty() && output.stdout.is_empty());
     assert_eq!(folder.object(&format!("{RENDER} --spp 4 -q --json"))["spp"], 4);
+    let output = folder.run("bake scene.obj --vertices --spp 4 -q -o table.csv");
+    assert!(output.status.success() && output.stderr.is_empty() && output.stdout.is_empty());
+    let output = folder.run("bake scene.obj --vertices --spp 4 -q");
+    assert!(output.stderr.is_empty() && output.stdout.starts_with(b"x,y,z,"), "a table is a result");
     assert!(folder.refused("render none.obj -q").starts_with("error: none.obj"));
 }
 

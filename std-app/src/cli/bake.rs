@@ -166,8 +166,7 @@ impl Bake {
             let table = String::from_utf8_lossy(&table);
             return Ok(outputs.end(table.trim_end(), code(&baked)));
         }
-        let results = if self.json { self.object(&baked).to_string() } else { self.text(&baked) };
-        Ok(outputs.end(&results, code(&baked)))
+        Ok(outputs.end_with(|| self.object(&baked), || self.text(&baked), code(&baked)))
     }
 
     fn load(&self, outputs: &Outputs, options: &LoadOptions) -> Result<LoadedScene, Failure> {

@@ -65,9 +65,8 @@ impl Merge {
         };
         let picture = Picture { image: &merged.image, shown: &shown, exr: &exr };
         let saved = outputs.save_to(&self.output, &picture);
-        let results =
-            if self.json { self.object(&merged, &saved).to_string() } else { self.text(&merged, &saved) };
-        Ok(outputs.end(&results, ExitCode::SUCCESS))
+        let (object, text) = (|| self.object(&merged, &saved), || self.text(&merged, &saved));
+        Ok(outputs.end_with(object, text, ExitCode::SUCCESS))
     }
 
     /// Merges bakes.
@@ -84,8 +83,8 @@ impl Merge {
             });
         }
         let spp = baked.values.iter().map(|value| value.samples).min().unwrap_or_default();
-        let results = match self.json {
-            true => json!({
+        let object = || {
+            json!({
                 "points": baked.values.len(),
                 "shards": self.films.len(),
                 "spp": spp,
@@ -96,10 +95,9 @@ impl Merge {
                 "paths": baked.counters.paths,
                 "outputs": self.output.iter().map(|file| file_name(file)).collect::<Value>(),
             })
-            .to_string(),
-            false => format!("{} points, {spp} samples each", baked.values.len()),
         };
-        Ok(outputs.end(&results, ExitCode::SUCCESS))
+        let text = || format!("{} points, {spp} samples each", baked.values.len());
+        Ok(outputs.end_with(object, text, ExitCode::SUCCESS))
     }
 
     fn object(&self, merged: &Merged, saved: &[&PathBuf]) -> Value {

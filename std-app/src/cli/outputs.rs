@@ -3,9 +3,10 @@
 
 use super::failure::Failure;
 use super::interrupt::INTERRUPT;
-use super::stdio::{print_message, print_result};
+use super::stdio::{is_quiet, print_message, print_result};
 use halflight::report::{self, Files};
 use halflight::save::{self, Destination, ExrFile, Format, Identity, Image, Patience};
+use serde_json::Value;
 use std::io::{self, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -205,6 +206,21 @@ impl Outputs {
     /// Records the failure of an output.
     pub(super) fn fail(&mut self, error: impl Into<Failure>) {
         self.failures.push(error.into());
+    }
+
+    /// Prints the object or the summary of a command, neither of which is made in vain, and failures.
+    pub(super) fn end_with(
+        self,
+        object: impl FnOnce() -> Value,
+        summary: impl FnOnce() -> String,
+        code: ExitCode,
+    ) -> ExitCode {
+        let results = match self.is_json {
+            true => object().to_string(),
+            false if is_quiet() => String::new(),
+            false => summary(),
+        };
+        self.end(&results, code)
     }
 
     /// Prints results and failures. Returns `code`, or 2 after a failure.

@@ -111,8 +111,8 @@ impl Race {
         let race = report::Race { entries: entries.collect(), seconds: self.time, provenance: &provenance };
         let is_early = INTERRUPT.load(Ordering::Relaxed);
         let reported = self.report.as_deref().filter(|folder| outputs.save_report(folder, &race.files()));
-        let results = if self.json { race.object().to_string() } else { self.text(&race, reported) };
-        Ok(outputs.end(&results, if is_early { ExitCode::from(3) } else { ExitCode::SUCCESS }))
+        let code = if is_early { ExitCode::from(3) } else { ExitCode::SUCCESS };
+        Ok(outputs.end_with(|| race.object(), || self.text(&race, reported), code))
     }
 
     /// Pictures of all methods, rendered in turns.

@@ -10,7 +10,7 @@ use super::outputs::{Outputs, Picture, Role};
 use super::picture_args::{MethodArg, MethodArgs, PictureArgs, file_name, note_darkness, render_failure};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::view_args::ViewArgs;
-use super::{print_note, stdio, summary, values};
+use super::{print_note, summary, values};
 use clap::Args;
 use halflight::compare::compare;
 use halflight::layers::{Facts, LayerSource};
@@ -158,18 +158,13 @@ impl Render {
             provenance: &provenance,
         };
         let reported = self.report.as_deref().filter(|folder| outputs.save_report(folder, &run.files()));
-        let results = match self.json {
-            true => run.object().to_string(),
-            false if stdio::is_quiet() => String::new(),
-            false => summary::text(&run, reported, by_default),
-        };
         let code = match result.ending {
             Ending::Done => ExitCode::SUCCESS,
             // The user asked for no error that could be missed.
             Ending::Biased | Ending::NoiseFloor if by_default => ExitCode::SUCCESS,
             Ending::Interrupted | Ending::Biased | Ending::NoiseFloor => ExitCode::from(3),
         };
-        Ok(outputs.end(&results, code))
+        Ok(outputs.end_with(|| run.object(), || summary::text(&run, reported, by_default), code))
     }
 
     /// Settings of the flags, completed by those of the scene file.

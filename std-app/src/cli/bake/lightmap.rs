@@ -83,14 +83,15 @@ impl LightmapArgs {
         let (computed, filled) = (map.count(Texel::Computed), lightmap.filled(&map));
         let padded = map.count(Texel::Filled) - filled;
         let charts = lightmap.charts();
-        let mut object = bake.object(&baked);
-        object["charts"] = charts.into();
-        object["texels"] = json!({ "computed": computed, "filled": filled, "padded": padded });
-        object["error_map"] = self.error_map.as_deref().map_or(Value::Null, file_name);
-        let text =
-            format!("{charts} charts, {computed} texels computed and {filled} filled; {}", bake.text(&baked));
-        let results = if bake.json { object.to_string() } else { text };
-        Ok(outputs.end(&results, code(&baked)))
+        let object = || {
+            let mut object = bake.object(&baked);
+            object["charts"] = charts.into();
+            object["texels"] = json!({ "computed": computed, "filled": filled, "padded": padded });
+            object["error_map"] = self.error_map.as_deref().map_or(Value::Null, file_name);
+            object
+        };
+        let texels = format!("{charts} charts, {computed} texels computed and {filled} filled");
+        Ok(outputs.end_with(object, || format!("{texels}; {}", bake.text(&baked)), code(&baked)))
     }
 }
 

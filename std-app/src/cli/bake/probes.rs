@@ -56,10 +56,12 @@ impl ProbeArgs {
             outputs.save_table(path, |out| write_probes(out, *format, &grid, &probes));
         }
         let inside = probes.iter().filter(|probe| !probe.is_valid).count();
-        let mut object = bake.object(&baked);
-        object["probes"] = json!({ "count": probes.len(), "inside": inside });
-        let text = format!("{} probes, {inside} inside bodies; {}", probes.len(), bake.text(&baked));
-        let results = if bake.json { object.to_string() } else { text };
-        Ok(outputs.end(&results, code(&baked)))
+        let object = || {
+            let mut object = bake.object(&baked);
+            object["probes"] = json!({ "count": probes.len(), "inside": inside });
+            object
+        };
+        let text = || format!("{} probes, {inside} inside bodies; {}", probes.len(), bake.text(&baked));
+        Ok(outputs.end_with(object, text, code(&baked)))
     }
 }
