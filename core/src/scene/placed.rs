@@ -19,22 +19,23 @@ pub(crate) struct PlacedTriangle {
 }
 
 impl<'a> Instances<'a> {
+    /// Number of the instance of triangle `index`; `None` before the first instance.
+    #[inline]
+    fn number_of(&self, index: u32) -> Option<usize> {
+        self.placed.partition_point(|instance| instance.first <= index).checked_sub(1)
+    }
+
     /// Instance of triangle `index`; `None` before the first instance.
     #[inline]
     pub(crate) fn instance_of(&self, index: u32) -> Option<&'a Instance> {
-        let number = self.placed.partition_point(|instance| instance.first <= index).checked_sub(1)?;
-        self.placed.get(number)
+        self.placed.get(self.number_of(index)?)
     }
 }
 
 impl<'a> Mesh<'a> {
     /// Position of triangle `index` in a list of all triangles in world space and then all instances.
     pub(crate) fn index_among_objects(&self, index: u32) -> usize {
-        let placed = self.instances.placed;
-        match placed.partition_point(|instance| instance.first <= index).checked_sub(1) {
-            Some(number) => self.triangles.len() + number,
-            None => index as usize,
-        }
+        self.instances.number_of(index).map_or(index as usize, |number| self.triangles.len() + number)
     }
 
     /// Instance of triangle `index`, its prototype, and its index there. `None` for triangles in world space.
