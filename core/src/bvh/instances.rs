@@ -48,7 +48,7 @@ pub(super) struct Entry {
     rest: [u32; 7],
 }
 
-/// Where a ray is: hit outside, and entry that it is in.
+/// Position of a ray in the hierarchy: its hit outside, and the entry that it is in.
 #[derive(Clone, Copy)]
 pub(super) struct Outside {
     hit: Hit,

@@ -1,6 +1,6 @@
 //! Builds of the code of a renderer: for diffuse surfaces, for opaque ones, and for all. The scene decides.
 
-// Where the size of the code counts more than its speed, the build for all surfaces serves every scene.
+// With the feature `small`, for little code at less speed, the build for all surfaces serves every scene.
 #[cfg(feature = "small")]
 pub(super) use crate::bsdf::{All, All as DiffuseTextured, All as Opaque};
 #[cfg(not(feature = "small"))]

@@ -75,7 +75,7 @@ pub struct RecordPlacement<'p, 'a, F> {
     pub metric: metric::Settings,
     /// Least radius of a record, in pixels.
     pub least_pixels: f32,
-    /// Where records may be placed.
+    /// Positions at which records may be placed.
     pub source: PlaceSource<'p>,
     /// [`step_points`].
     pub step: &'p mut [GatherPoint],

@@ -1,4 +1,4 @@
-//! Where records may be placed: at surfaces that the camera sees, or at given points.
+//! Positions of records: at surfaces that the camera sees, or at given points.
 
 use crate::bsdf::Features;
 use crate::cache::radiance::ServedLobes;

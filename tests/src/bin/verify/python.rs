@@ -12,7 +12,7 @@ const PACKAGE: &str = "std-app/bindings/python";
 /// Largest wheel in bytes.
 const MAX_WHEEL: u64 = 6 << 20;
 
-/// What the environment has: the builder, and what the tests need.
+/// Packages of the environment: the builder, and those of the tests.
 const TOOLS: &str = "maturin>=1.9,<2 numpy pytest mypy nbclient ipykernel";
 
 /// Builds the wheel and runs pytest. The package shares the folder of products with the root workspace.
