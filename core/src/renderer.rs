@@ -3,6 +3,10 @@
 mod audited;
 mod build;
 mod error;
+// Tests have instances of their own.
+#[cfg(not(test))]
+#[doc(hidden)]
+pub mod instances;
 mod of_features;
 mod points;
 mod reconstructing;

@@ -124,6 +124,7 @@ impl<'a, F: Features> Chains<'a, F> {
 
     /// Follows the first `count` rays of the batch into `batch.seen`; `sampler` gives the random numbers of
     /// a ray. Albedo and normal are left out unless `with_surfaces`. Returns the number of traced rays.
+    #[inline(never)]
     pub(super) fn trace(
         &self,
         batch: &mut Batch,

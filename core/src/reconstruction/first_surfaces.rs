@@ -138,6 +138,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 
     /// First pass: the pixels of a band from index `first`, and their clusters, if all rays agree.
+    #[inline(never)]
     fn find_in_band(
         &self,
         first: usize,
@@ -164,6 +165,7 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
     }
 
     /// Second pass: fractions of the clusters of pixels at edges, by `rays` rays. Marks the rims of lamps.
+    #[inline(never)]
     fn refine_band(
         &self,
         first: usize,

@@ -100,6 +100,7 @@ impl<F: Features> FirstSurfaces<'_, F> {
     }
 
     /// First pass: means of the pixels of a band from index `first`, and a key of their material and object.
+    #[inline(never)]
     fn layers_of_band(
         &self,
         first: usize,

@@ -277,6 +277,7 @@ impl<F: Features> Pilot<'_, '_, F> {
     }
 
     /// One sample of a tile, into its blocks and sums. The work of one weighting.
+    #[inline(never)]
     fn tile(
         &self,
         (tile, sample): (usize, u32),

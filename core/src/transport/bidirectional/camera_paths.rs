@@ -95,6 +95,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`CameraPaths::scratch`].
+    #[inline(never)]
     pub fn run(
         &self,
         tile: usize,

@@ -88,6 +88,7 @@ impl<'a, F: Features> LightPass<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`LightPass::scratch`].
+    #[inline(never)]
     pub fn run(
         &self,
         (task, sample): (usize, u32),

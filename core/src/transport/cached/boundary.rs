@@ -31,6 +31,7 @@ const WALL_FRACTION: f32 = 0.95;
 impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     /// Finds walls around a record at `place` by rays, and overhangs around it from the hits of its `strata`,
     /// which are local to `frame`.
+    #[inline(never)]
     pub(in crate::transport) fn find_boundary(
         &self,
         record: &mut Record,

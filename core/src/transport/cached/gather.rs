@@ -129,6 +129,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     ///
     /// # Errors
     /// Those of [`PathIntegrator::gather`].
+    #[inline(never)]
     pub fn gather_with(
         &self,
         place: &GatherPoint,

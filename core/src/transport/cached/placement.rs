@@ -98,6 +98,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     }
 
     /// [`PathIntegrator::places`], and points with one of the `lobes` that records serve.
+    #[inline(never)]
     pub fn places_with(
         &self,
         order: &ProgressiveOrder,

@@ -174,6 +174,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     }
 
     /// Points of the steps from `first` on whose narrow lobe the camera sees, one for each entry of `out`.
+    #[inline(never)]
     pub fn view_points(
         &self,
         (order, sample): (&ProgressiveOrder, u32),
@@ -193,6 +194,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::view_scratch`].
+    #[inline(never)]
     pub fn gather_view(
         &self,
         place: &ViewPoint,

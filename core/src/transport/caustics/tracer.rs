@@ -132,6 +132,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`CausticPhotonTracer::scratch`] bytes.
+    #[inline(never)]
     pub fn run(
         &self,
         task: usize,

@@ -54,6 +54,7 @@ impl<'a, F: Features> LightPass<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`LightPass::scratch`].
+    #[inline(never)]
     pub fn run(
         &self,
         (task, pass): (usize, u32),

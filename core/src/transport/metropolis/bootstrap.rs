@@ -130,6 +130,7 @@ impl<'a, F: Features> Bootstrap<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`Bootstrap::scratch`].
+    #[inline(never)]
     pub fn run(
         &self,
         task: usize,

@@ -108,6 +108,7 @@ impl<'a, F: Features> Chains<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`Chains::scratch`].
+    #[inline(never)]
     pub fn run(
         &self,
         task: usize,

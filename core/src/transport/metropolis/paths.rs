@@ -90,6 +90,7 @@ impl<'a, F: Features> Paths<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`Paths::scratch`].
+    #[inline(never)]
     pub fn run(
         &self,
         tile: usize,

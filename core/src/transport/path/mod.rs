@@ -149,6 +149,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    #[inline(never)]
     pub fn run(
         &self,
         task: usize,
@@ -261,6 +262,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     }
 
     /// Replaces the pixels of the first `count` paths by their camera rays, sixteen at a time.
+    #[inline(never)]
     pub(in crate::transport) fn aim(&self, wave: &mut Wavefront, count: usize) {
         let PathSettings { width, height, seed, .. } = self.settings;
         let (level, camera) = (self.context.level, &self.context.scene.camera);
@@ -317,6 +319,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
     }
 
     /// Follows the paths of the first `count` rays, already traced, to the end.
+    #[inline(never)]
     pub(in crate::transport) fn trace_to_end(
         &self,
         PathWave { wave, memory }: &mut PathWave<E::State, R>,

@@ -17,6 +17,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    #[inline(never)]
     pub fn sample_pixels(
         &self,
         pixels: &[[u32; 2]],

@@ -163,6 +163,7 @@ impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    #[inline(never)]
     pub fn sample_irradiance(
         &self,
         (points, part): (&[IrradiancePoint], LightPart),

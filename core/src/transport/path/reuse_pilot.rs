@@ -164,6 +164,7 @@ impl<F: Features, E: LightEstimator<F>> PathIntegrator<'_, F, E> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    #[inline(never)]
     pub fn pilot(
         &self,
         task: usize,

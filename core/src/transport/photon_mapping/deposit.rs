@@ -118,6 +118,7 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PhotonTracer::scratch`] bytes.
+    #[inline(never)]
     pub fn run(
         &self,
         task: usize,

@@ -58,6 +58,7 @@ impl<'a, F: Features> HiddenLightTracer<'a, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`HiddenLightTracer::scratch`] bytes.
+    #[inline(never)]
     pub fn run(
         &self,
         task: usize,
@@ -73,6 +74,7 @@ impl<'a, F: Features> HiddenLightTracer<'a, F> {
 
     /// Mean of the channels of the hidden radiance along camera ray `number` of `raster`, by the photons of
     /// `map` in kernels of `radii`.
+    #[inline(never)]
     pub fn along(
         &self,
         raster: &VisiblePointSampler,

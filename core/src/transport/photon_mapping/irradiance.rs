@@ -68,6 +68,7 @@ impl<'a> PrecomputedIrradiance<'a> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PrecomputedIrradiance::scratch`] bytes.
+    #[inline(never)]
     pub fn run(&self, task: usize, scratch: &mut Arena, out: &mut [Photon]) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
         let mut neighbours = Neighbours::new(NEAREST, &mut arena)?;

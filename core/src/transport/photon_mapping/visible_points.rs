@@ -66,6 +66,7 @@ impl VisiblePointSampler {
 
     /// Visible points of task `task`, one per ray, as photons without power; a ray that finds none writes a
     /// photon that a map rejects. A task has [`VisiblePointSampler::TASK`] rays.
+    #[inline(never)]
     pub fn run<F: Features>(
         &self,
         task: usize,

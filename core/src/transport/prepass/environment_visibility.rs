@@ -222,6 +222,7 @@ impl<F: Features> PathIntegrator<'_, F> {
 
     /// Stores the vertices of task `task`, which has this number of `paths`, in its part of the
     /// [`VisibilityPrepass`].
+    #[inline(never)]
     pub fn store_vertices(&self, task: usize, paths: usize, part: &mut [VisibilityVertex]) {
         part.fill(VisibilityVertex { place: NO_PLACE, ..VisibilityVertex::default() });
         let crate::transport::PathSettings { width, height, seed, .. } = self.settings;
@@ -292,6 +293,7 @@ impl<F: Features> PathIntegrator<'_, F> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::learn_table_scratch`] bytes.
+    #[inline(never)]
     pub fn learn_table(
         &self,
         prepass: &VisibilityPrepass,

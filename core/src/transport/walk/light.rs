@@ -191,6 +191,7 @@ impl<'a, F: Features> LightWalk<'a, F> {
     }
 
     /// Follows the paths of task `task` of map `map`.
+    #[inline(never)]
     pub(crate) fn follow<V: Visitor>(
         &self,
         task: usize,

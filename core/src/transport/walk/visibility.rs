@@ -61,6 +61,7 @@ impl<'w> ShadowRays<'w> {
 
     /// Traces the queue and empties it. `arrive` gets each ray that reaches its light, and the transmitted
     /// light. Rays that hit too many cut-outs are counted as unfinished.
+    #[inline(never)]
     pub(crate) fn trace<F: Features>(
         &mut self,
         context: &SceneContext<F>,
@@ -121,6 +122,7 @@ impl<F: Features> SceneContext<'_, F> {
 
     /// [`ShadowRays::trace`] with cut-outs: in each pass every ray advances to its next surface. Returns the
     /// number of rays that hit too many.
+    #[inline(never)]
     fn trace_through_cutouts(
         &self,
         shadows: &mut ShadowRays,
