@@ -123,9 +123,9 @@ pub use halflight_simd::{Level, Tier};
 pub use memory::{Arena, Line};
 pub use method::choice::Goal;
 pub use method::{
-    BidirectionalSettings, CacheOptions, Executor, LobeSettings, Loop, Method, MethodKind,
-    MetropolisSettings, Passed, PathOptions, PhotonSettings, PointMethod, Shard, VirtualLightSettings,
-    Worker,
+    Basis, BidirectionalSettings, CacheOptions, Executor, LobeSettings, Loop, Method, MethodKind,
+    MetropolisSettings, Passed, PathOptions, PhotonSettings, PointMethod, PrimarySpace, Shard,
+    VirtualLightSettings, Worker,
 };
 pub use renderer::{
     IrradianceRenderer, PointIrradiance, PointSettings, RenderError, Renderer, RequiredMemory, Settings,

@@ -13,7 +13,10 @@ mod reconstructing;
 mod rounds;
 mod settings;
 
-pub use crate::audit::{AuditWork, Audited, ErrorReport, NoiseAndBlur, Region};
+pub use crate::audit::{AuditWork, Audited, ErrorReport, NoiseAndBlur, Region, Regions};
+pub use crate::estimate::{BiasEstimate, Deviation};
+pub use crate::film::{Dropped, Half, PixelWindow};
+pub use crate::method::hidden_light::LackingLight;
 pub use crate::reconstruction::ReconstructionError;
 #[doc(hidden)]
 pub use audited::OutOfReach;

@@ -100,6 +100,7 @@ impl Level {
 
     /// Runs `kernel` compiled for this level.
     #[inline]
+    #[doc(hidden)]
     pub fn dispatch<K: Kernel>(self, kernel: K) -> K::Out {
         #[cfg(any(test, feature = "scalar"))]
         if self == Self::SCALAR {

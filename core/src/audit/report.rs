@@ -28,6 +28,7 @@ pub struct ErrorReport {
 impl ErrorReport {
     /// Report of a picture, or of its `reconstruction`, which is made anew, with the result of its `audit` if
     /// it has one.
+    #[doc(hidden)]
     pub fn new<F: Features, E: Executor>(
         state: &RenderState,
         reconstruction: Option<&mut FilmReconstruction>,
@@ -44,6 +45,7 @@ impl ErrorReport {
 
     /// Report of a picture, or of its `reconstruction`, which is made anew. `audit` judges it by its mean,
     /// its noise and that reconstruction.
+    #[doc(hidden)]
     pub fn judged_by<E: Executor>(
         state: &RenderState,
         reconstruction: Option<&mut FilmReconstruction>,
@@ -81,6 +83,7 @@ impl ErrorReport {
     }
 
     /// Report of `film` or its `reconstruction` with the same noise, and the newest result of its `audit`.
+    #[doc(hidden)]
     pub fn judged_anew<F: Features, E: Executor>(
         self,
         film: &Film,
@@ -143,6 +146,7 @@ impl ErrorReport {
     }
 
     /// This report of a picture `film` that lacks `hidden` light.
+    #[doc(hidden)]
     pub fn lacking(self, hidden: Option<&HiddenLight>, film: &Film) -> Self {
         Self { lacking: hidden.map(|hidden| hidden.lacking_in(film)), ..self }
     }

@@ -100,6 +100,7 @@ impl BiasEstimate {
     ///
     /// Differences of neighbours count as chance. This overestimates the variance if strata differ, so that
     /// the interval is rather too wide than too narrow.
+    #[doc(hidden)]
     pub fn of(findings: impl Iterator<Item = (PixelBias, f64)>) -> Option<Self> {
         let (mut count, mut differences) = (0.0, 0.0);
         let (mut sum, mut squares, mut cubes) = (0.0, 0.0, 0.0);

@@ -69,6 +69,7 @@ impl core::ops::AddAssign for TileBlur {
 
 impl BiasEstimate {
     /// Blur of all tiles of a picture; `None` without photons.
+    #[doc(hidden)]
     pub fn of_blur(tiles: impl Iterator<Item = TileBlur>) -> Option<Self> {
         let mut sum = TileBlur::default();
         tiles.for_each(|tile| sum += tile);

@@ -68,6 +68,7 @@ impl ErrorEstimate {
 
     /// Estimate from all tiles of a picture whose pixels share nothing, or share paths within groups and
     /// photons with neighbours; `None` if no pixel has four samples.
+    #[doc(hidden)]
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);

@@ -39,14 +39,14 @@ mod tuned;
 pub mod view_placement;
 mod work;
 
-pub use crate::cache::radiance::LobeSettings;
+pub use crate::cache::radiance::{Basis, LobeSettings};
 pub use any::{AnyMethod, ChosenMethod};
 pub use bidirectional::BidirectionalSettings;
 pub use executor::{Executor, Loop, Passed, Worker};
 pub use instant_radiosity::VirtualLightSettings;
 pub use irradiance_points::{IrradiancePoints, PointMethod, WantedIrradiance};
 pub use kind::MethodKind;
-pub use metropolis::MetropolisSettings;
+pub use metropolis::{MetropolisSettings, PrimarySpace};
 pub use options::{CacheOptions, Method, MethodOptions, PathOptions};
 pub use photon_map_store::{PhotonMapPair, PhotonMapStore};
 pub use photons::{MapUse, PhotonSettings, PhotonUse};

@@ -88,6 +88,7 @@ impl Method {
     }
 
     /// Its options, among the usual ones of all other methods.
+    #[doc(hidden)]
     pub fn options(&self) -> MethodOptions {
         let usual = MethodOptions::default();
         match *self {
@@ -181,6 +182,7 @@ impl CacheOptions {
 
     /// Gather rays and density of the records. Coarser ones, and those of other metrics, are taken for as
     /// dense as the default.
+    #[doc(hidden)]
     pub fn resolution(&self) -> CacheResolution {
         let error = match self.metric {
             Metric::Halflight => self.allowed().min(CacheResolution::COARSEST.error),

@@ -28,7 +28,9 @@
 //! # Ok::<(), halflight_core::memory::OutOfMemory>(())
 //! ```
 
-pub use crate::cache::irradiance::{CellFlux, Derivatives, Hemisphere, Metric, Validity, metric, validity};
+pub use crate::cache::irradiance::{
+    CellFlux, Derivatives, Hemisphere, Hessian, Metric, Validity, metric, validity,
+};
 pub use crate::sampling::warp::cosine_hemisphere;
 
 use crate::bsdf::All;

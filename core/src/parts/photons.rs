@@ -30,5 +30,6 @@
 //! ```
 
 pub use crate::photon::{
-    DensityEstimate, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Response, Uniform,
+    DensityEstimate, Kernel, KernelBoundary, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder,
+    Response, Uniform,
 };

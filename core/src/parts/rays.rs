@@ -16,6 +16,7 @@
 //! # Ok::<(), halflight_core::memory::OutOfMemory>(())
 //! ```
 
+pub use crate::bvh::clearance::{Clearance, ClearanceQuery};
 pub use crate::bvh::{Bvh, Coherence, ForkJoin, Serial};
-pub use crate::geometry::{Bounds, Hit, MISS, Ray};
+pub use crate::geometry::{Bounds, Frame, Hit, MISS, Ray};
 pub use crate::scene::{Instance, Instances, Mesh, Prototype, SurfacePoint, Triangle};

@@ -12,4 +12,7 @@
 //! assert!((value / pdf - sample.weight).abs().max_element() < 1e-6);
 //! ```
 
-pub use crate::bsdf::{All, Bsdf, BsdfSample, Diffuse, DiffuseOnly, DiffuseTextured, Features, Opaque};
+pub use crate::bsdf::{
+    All, Bsdf, BsdfSample, Conductor, Dielectric, Diffuse, DiffuseOnly, DiffuseTextured, Features, Glossy,
+    Mirror, Only, Opaque, Pane, Plastic, RoughDielectric,
+};

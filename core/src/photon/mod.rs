@@ -102,6 +102,7 @@ pub struct MapShape {
 
 impl<'m> PhotonMap<'m> {
     /// Shape of this map, for [`PhotonMap::from_shape`].
+    #[doc(hidden)]
     pub fn shape(&self) -> MapShape {
         let Self { levels, count, refused, space, .. } = *self;
         MapShape { levels, count, refused, space }
@@ -112,6 +113,7 @@ impl<'m> PhotonMap<'m> {
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Photons::footprint`], or than the shape.
+    #[doc(hidden)]
     pub fn from_shape(shape: &MapShape, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let available = arena.available();
         let short = OutOfMemory { needed: usize::MAX, available };

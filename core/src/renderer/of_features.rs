@@ -250,6 +250,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
     }
 
     /// Reconstruction of the picture, if it is wanted.
+    #[doc(hidden)]
     pub fn reconstruction(&self) -> Option<&FilmReconstruction<'a>> {
         self.reconstruction.as_ref()
     }

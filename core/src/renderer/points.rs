@@ -228,6 +228,7 @@ impl<'a> IrradianceRenderer<'a> {
     }
 
     /// Sums of the samples. Pixels are points along a Z-curve.
+    #[doc(hidden)]
     pub fn state(&self) -> &RenderState<'a> {
         &self.film.state
     }

@@ -79,6 +79,7 @@ impl LobeSettings {
     }
 
     /// Representation of records at most.
+    #[doc(hidden)]
     pub fn representation(&self) -> Representation {
         let Self { basis, degree, .. } = *self;
         Representation { basis, degree: degree.min(basis.degree_max()) }

@@ -3,7 +3,7 @@
 use crate::command::{command, run};
 use crate::{Failure, Outcome, Project};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most items that the documentation may show, so that the front stays a front.
 const MOST_ITEMS: usize = 250;
@@ -15,6 +15,9 @@ const MOST_SHOWN: usize = 8;
 const LIST: &str = "core/doors.txt";
 const VARIABLE: &str = "SNAPSHOT";
 
+/// Types of signatures that other crates document, glam and bytemuck, and names within a type.
+const FOREIGN: [&str; 7] = ["AnyBitPattern", "Item", "Mat3", "NoUninit", "Self", "Vec2", "Vec3"];
+
 /// Kinds of names within an item.
 const KINDS: [&str; 5] = ["method", "tymethod", "variant", "structfield", "associatedconstant"];
 
@@ -23,7 +26,14 @@ pub(crate) fn check(project: &Project) -> Outcome {
     // Links to private modules are judged by the step of the documentation.
     run(command(&project.root, line).env("RUSTDOCFLAGS", "-A rustdoc::private_intra_doc_links"))?;
     let pages = project.root.join("target/doc/halflight_core");
-    let found = doors(&pages).map_err(|error| Failure::Failed(format!("{}: {error}", pages.display())))?;
+    let failed = |error| Failure::Failed(format!("{}: {error}", pages.display()));
+    let found = doors(&pages).map_err(failed)?;
+    if let Some((file, name)) = unnamed(&pages).map_err(failed)? {
+        return Err(Failure::Failed(format!(
+            "{}: a signature has the type `{name}`, which no user can name: export it, or hide what has it",
+            file.display()
+        )));
+    }
     let items = found.lines().filter(|line| !line.starts_with(' ')).count();
     if items > MOST_ITEMS {
         return Err(Failure::Failed(format!("the core shows {items} items, more than {MOST_ITEMS}")));
@@ -73,11 +83,16 @@ fn doors(pages: &Path) -> std::io::Result<String> {
     Ok(lines.join("\n") + "\n")
 }
 
+/// The part of a page before the traits that its item implements.
+fn own(page: &str) -> &str {
+    let ends = ["deref-methods", "trait-implementations", "synthetic-implementations", "implementors"];
+    let end = ends.iter().filter_map(|end| page.find(&format!("id=\"{end}"))).min();
+    &page[..end.unwrap_or(page.len())]
+}
+
 /// Names that an item declares itself, without those of the traits that it implements.
 fn names_in(page: &str) -> Vec<String> {
-    let ends = ["id=\"trait-implementations\"", "id=\"synthetic-implementations\"", "id=\"implementors\""];
-    let own = ends.iter().fold(page, |page, end| page.split_once(end).map_or(page, |(own, _)| own));
-    let ids = own.split(" id=\"").skip(1).filter_map(|rest| rest.split_once('"').map(|(id, _)| id));
+    let ids = own(page).split(" id=\"").skip(1).filter_map(|rest| rest.split_once('"').map(|(id, _)| id));
     let is_name = |id: &&str| id.split_once('.').is_some_and(|(kind, _)| KINDS.contains(&kind));
     let mut names: Vec<String> = ids.filter(is_name).map(str::to_owned).collect();
     names.sort();
@@ -85,9 +100,63 @@ fn names_in(page: &str) -> Vec<String> {
     names
 }
 
+/// A type in a signature or a field that has no page of its own, and the file that shows it.
+fn unnamed(folder: &Path) -> std::io::Result<Option<(PathBuf, String)>> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let found = match path.is_dir() {
+            true => unnamed(&path)?,
+            false => unlinked_type(&fs::read_to_string(&path)?).map(|name| (path, name)),
+        };
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    Ok(None)
+}
+
+/// A type without a link among the arguments, results and fields that an item declares itself.
+fn unlinked_type(page: &str) -> Option<String> {
+    let methods = own(page).split("<h4 class=\"code-header\">").skip(1).filter_map(|rest| {
+        let (signature, _) = rest.split_once("</h4>")?;
+        signature.split_once("</a>(").or_else(|| signature.split_once("</a>&lt;"))
+    });
+    let fields = own(page).split("<span id=\"structfield.").skip(1).filter_map(|rest| {
+        let (_, code) = rest.split_once("<code>")?;
+        code.split_once("</code>")?.0.split_once(": ")
+    });
+    methods.chain(fields).find_map(|(_, types)| {
+        // Text outside of links and tags.
+        let plain: String = types
+            .split("<a ")
+            .enumerate()
+            .map(|(i, part)| if i == 0 { part } else { part.split_once("</a>").map_or("", |(_, text)| text) })
+            .collect();
+        let texts = plain.split('<').map(|part| part.split_once('>').map_or(part, |(_, text)| text));
+        let words = texts.flat_map(|text| text.split(|letter: char| !letter.is_alphanumeric()));
+        let is_type = |word: &&str| {
+            word.starts_with(char::is_uppercase)
+                && word.contains(char::is_lowercase)
+                && !FOREIGN.contains(word)
+        };
+        words.into_iter().find(is_type).map(str::to_owned)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_type_without_a_page_is_found() {
+        let linked =
+            "<h4 class=\"code-header\">pub fn <a href=\"#x\">at</a>(ray: &amp;<a href=\"r\">Ray</a>)</h4>";
+        assert_eq!(unlinked_type(linked), None);
+        let method = linked.replace("<a href=\"r\">Ray</a>", "Ray");
+        assert_eq!(unlinked_type(&method).as_deref(), Some("Ray"));
+        let field = "<span id=\"structfield.f\"><code>f: [<a href=\"r\">Ray</a>; Count]</code>";
+        assert_eq!(unlinked_type(field).as_deref(), Some("Count"));
+    }
 
     #[test]
     fn names_of_an_item_end_before_the_traits_that_it_implements() {
