@@ -6,12 +6,12 @@ use crate::{Outcome, Project};
 /// Directories with their own workspace.
 const WORKSPACES: &[&str] = &[".", "tests/targets", "fuzz", "core/bindings/c", "std-app/bindings/python"];
 
-/// Clippy selections: directory and arguments. The main workspace uses the profile of tests, to share
-/// compiled macros and build scripts.
+/// Clippy selections: directory and arguments. All use the profile and the products of tests, to share
+/// compiled macros, build scripts and checked dependencies.
 const CLIPPY: &[(&str, &str)] = &[
-    (".", "--profile quick --workspace --all-targets"),
+    (".", "--workspace --all-targets"),
     // Without default features, as a microcontroller builds it.
-    (".", "--profile quick -p halflight-core -p halflight-simd --lib"),
+    (".", "-p halflight-core -p halflight-simd --lib"),
     ("tests/targets", "-p tiny -p host"),
     ("fuzz", "--no-default-features --features app --lib --bins"),
 ];
@@ -25,8 +25,9 @@ pub(crate) fn fmt(project: &Project) -> Outcome {
 
 pub(crate) fn clippy(project: &Project) -> Outcome {
     for (folder, what) in CLIPPY {
-        let line = format!("cargo clippy --quiet --locked {what} -- -D warnings");
-        run(&mut command(&project.root.join(folder), &line))?;
+        let line = format!("cargo clippy --profile quick --quiet --locked {what} -- -D warnings");
+        let mut cargo = command(&project.root.join(folder), &line);
+        run(cargo.env("CARGO_TARGET_DIR", project.root.join("target")))?;
     }
     Ok(format!("{} selections", CLIPPY.len()))
 }
