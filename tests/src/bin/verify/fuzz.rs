@@ -1,7 +1,7 @@
 //! A short run of every fuzz target from its corpus: by cargo-fuzz if it and a nightly toolchain are
 //! installed, else by the driver `mutate`.
 
-use crate::command::{fresh_cargo, in_pairs, output, run};
+use crate::command::{command, fresh_cargo, in_pairs, output, run};
 use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::process::{Command, Stdio};
@@ -23,6 +23,14 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
     targets.sort();
 
     let coverage = has_cargo_fuzz();
+    // One build for all targets, beside the products of the main workspace, whose dependencies it shares.
+    let products = project.root.join("target");
+    if !coverage {
+        let line =
+            "cargo build --quiet --profile quick --locked --no-default-features --features app --bin mutate";
+        run(command(&folder, line).env("CARGO_TARGET_DIR", &products))?;
+    }
+    let driver = products.join("quick/mutate");
     // Smoke runs end after a fixed number of runs, so that every machine has the same result; campaigns end
     // by the clock.
     let runs = if seconds <= SMOKE_SECONDS { SMOKE_RUNS } else { -1 };
@@ -37,17 +45,14 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
             // No leak detection: it needs ptrace, which sandboxes forbid.
             run(fresh_cargo(&folder, &line).env("ASAN_OPTIONS", "detect_leaks=0"))
         } else {
-            let line = format!(
-                "cargo run --quiet --release --locked --target-dir target/stable --no-default-features --features app --bin mutate -- \
-                 {target} --seconds {seconds} --runs {runs} --seed 1"
-            );
-            println!("{}", output(&mut fresh_cargo(&folder, &line))?);
+            let limits = format!("{target} --seconds {seconds} --runs {runs} --seed 1");
+            println!("{}", output(Command::new(&driver).current_dir(&folder).args(limits.split(' ')))?);
             Ok(())
         }
     });
     results.into_iter().collect::<Result<(), Failure>>()?;
-    let driver = if coverage { "libFuzzer" } else { "the stable driver (no cargo-fuzz or no nightly here)" };
-    Ok(format!("{} targets, {seconds} s each, by {driver}", targets.len()))
+    let name = if coverage { "libFuzzer" } else { "the stable driver (no cargo-fuzz or no nightly here)" };
+    Ok(format!("{} targets, {seconds} s each, by {name}", targets.len()))
 }
 
 fn has_cargo_fuzz() -> bool {
