@@ -10,27 +10,31 @@ use crate::method::Loop;
 use crate::scene::Scene;
 use crate::transport::IrradiancePoint;
 
-type Steps<R> = fn(&mut R, &mut Loop<'static>, Until) -> Result<(), RenderError>;
-
-/// [`Renderer::new`] on one thread.
-pub static NEW_PICTURE: fn(
+type NewPicture = fn(
     &'static Scene<'static>,
     &Settings,
     &mut Arena<'static>,
     &mut Loop<'static>,
-) -> Result<Renderer<'static>, RenderError> = Renderer::new;
+) -> Result<Renderer<'static>, RenderError>;
 
-/// [`Renderer::step`] on one thread.
-pub static STEP_PICTURE: Steps<Renderer<'static>> = Renderer::step;
-
-/// [`IrradianceRenderer::new`] on one thread.
-pub static NEW_POINTS: fn(
+type NewPoints = fn(
     &'static Scene<'static>,
     &[IrradiancePoint],
     &PointSettings,
     &mut Arena<'static>,
     &mut Loop<'static>,
-) -> Result<IrradianceRenderer<'static>, RenderError> = IrradianceRenderer::new;
+) -> Result<IrradianceRenderer<'static>, RenderError>;
+
+type Step<R> = fn(&mut R, &mut Loop<'static>, Until) -> Result<(), RenderError>;
+
+/// [`Renderer::new`] on one thread.
+pub static NEW_PICTURE: NewPicture = Renderer::new;
+
+/// [`Renderer::step`] on one thread.
+pub static STEP_PICTURE: Step<Renderer<'static>> = Renderer::step;
+
+/// [`IrradianceRenderer::new`] on one thread.
+pub static NEW_POINTS: NewPoints = IrradianceRenderer::new;
 
 /// [`IrradianceRenderer::step`] on one thread.
-pub static STEP_POINTS: Steps<IrradianceRenderer<'static>> = IrradianceRenderer::step;
+pub static STEP_POINTS: Step<IrradianceRenderer<'static>> = IrradianceRenderer::step;
