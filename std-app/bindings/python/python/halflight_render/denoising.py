@@ -99,8 +99,10 @@ def denoise(
     apply = denoiser or _with_layers(first)
     mean = (a + b) / 2
     both = _applied(apply, mean)
-    # A denoiser that brightens a place must not lower the weight of its error, nor one that spreads a lamp.
-    weight = 1 / (np.minimum(np.abs(both), _spread(mean)) ** 2 + 0.01 * mean.mean() ** 2)
+    # A denoiser that brightens a place, or spreads a lamp, must not lower the weight of its error there. Samples that
+    # find no light must not raise it.
+    seen = np.maximum(np.abs(mean), _medians(mean))
+    weight = 1 / (np.minimum(np.abs(both), seen) ** 2 + 0.01 * mean.mean() ** 2)
 
     def error(denoised: NDArray[np.float64], other: NDArray[np.float64], variance: NDArray[np.float64]) -> Any:
         return ((denoised - other) ** 2 - variance) * weight
@@ -144,12 +146,12 @@ def _applied(denoiser: Callable[[Pixels], Pixels], image: NDArray[Any]) -> NDArr
     return np.asarray(denoiser(np.asarray(image, np.float32)), np.float64)
 
 
-def _spread(image: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Means of 5 × 5 pixels."""
-    padded = np.pad(image, ((2, 2), (2, 2), (0, 0)), "edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (5, 5), (0, 1))
-    spread: NDArray[np.float64] = windows.mean(axis=(-1, -2))
-    return spread
+def _medians(image: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Medians of 3 × 3 pixels."""
+    padded = np.pad(image, ((1, 1), (1, 1), (0, 0)), "edge").astype(np.float32)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), (0, 1))
+    channels = [np.median(windows[:, :, channel], axis=(-1, -2)) for channel in range(image.shape[2])]
+    return np.stack(channels, axis=2).astype(np.float64)
 
 
 def _blocks(pixels: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
