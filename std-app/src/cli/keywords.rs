@@ -84,7 +84,7 @@ fn command() -> MutexGuard<'static, Command> {
 impl Keywords {
     /// Names of all keywords.
     pub fn names() -> Vec<String> {
-        command().get_arguments().filter_map(keyword).collect()
+        names(&command())
     }
 
     /// Checks keywords and values as the command line checks them. `on` and `off` stand for a flag without a
@@ -96,7 +96,7 @@ impl Keywords {
         let mut command = command();
         let mut words: Vec<OsString> = Vec::new();
         for (name, value) in given {
-            let Some(arg) = flag(&command, name) else { return Err(unknown(name)) };
+            let Some(arg) = flag(&command, name) else { return Err(unknown(&command, name)) };
             let long = arg.get_long().unwrap_or_default();
             if !arg.get_action().takes_values() {
                 words.extend((value != "off").then(|| format!("--{long}").into()));
@@ -132,10 +132,14 @@ impl Keywords {
     }
 }
 
+fn names(command: &Command) -> Vec<String> {
+    command.get_arguments().filter_map(keyword).collect()
+}
+
 /// The refusal of a name.
-fn unknown(name: &str) -> Refused {
+fn unknown(command: &Command, name: &str) -> Refused {
     let problem = format!("there is no setting `{name}`");
-    Refused { problem, help: format!("the settings are {}", Keywords::names().join(", ")) }
+    Refused { problem, help: format!("the settings are {}", names(command).join(", ")) }
 }
 
 /// The name of the keyword of a flag in messages, as `--spp <N>`.
