@@ -64,13 +64,19 @@ def model(folder, distance):
 
 
 def rtrace(folder, name, parameters):
-    """Illuminances by Honeybee's command, processor seconds of the command, and those of rtrace alone."""
-    point = ["raytrace", "point-in-time", f"{name}.oct", "model/grid/desk.pts", "--rad-params", parameters]
-    output = f"{name}-rtrace.res"
+    """Illuminances, and processor seconds of rtrace."""
+    from halflight_render import daylight
+
+    script = f"rtrace -I -h {parameters} {name}.oct < model/grid/desk.pts > {name}.txt"
+    seconds = run("bash", "-c", script, folder=folder)
+    return np.loadtxt(folder / f"{name}.txt") @ daylight.HONEYBEE * 179, seconds
+
+
+def by_recipe(folder, name):
+    """Processor seconds of the command of the recipe with its parameters."""
+    point = ["raytrace", "point-in-time", f"{name}.oct", "model/grid/desk.pts", "--rad-params", SWEEP[0]]
     point += ["--rad-params-locked", "-h", "--metric", "illuminance"]
-    whole = run("honeybee-radiance", *point, "--output", output, folder=folder)
-    script = f"rtrace -I -h {parameters} {name}.oct < model/grid/desk.pts > alone.txt"
-    return np.loadtxt(folder / output), whole, run("bash", "-c", script, folder=folder)
+    return run("honeybee-radiance", *point, "--output", f"{name}-rtrace.res", folder=folder)
 
 
 def ours(folder, name, spp):
@@ -105,9 +111,10 @@ def compare(folder, name, arguments):
     within = np.abs(theirs - truth) <= QUANTILE * np.sqrt(noise + own)
     print(f"\n{name}: {len(truth)} sensors, within the joint interval {within.mean():.3f}, ", end="")
     print(f"mean of rtrace over ours {theirs.mean() / truth.mean():.4f}, ", end="")
-    print(f"processor s: ours {seconds:.1f}, rtrace {runs[0][2]:.1f} a run\n")
+    print(f"processor s: ours {seconds:.1f}, rtrace {runs[0][1]:.1f} a run\n")
     print("| who | settings | rms error | mean | processor s, command | alone |\n|---|---|---|---|---|---|")
     rows = [("rtrace", text, *rtrace(folder, name, text)) for text in SWEEP]
+    rows = [(*row[:3], by_recipe(folder, name) if at == 0 else np.nan, row[3]) for at, row in enumerate(rows)]
     for spp in SAMPLES:
         values, _, whole, alone = ours(folder, name, spp)
         rows.append(("halflight", f"--spp {spp}", values, whole, alone))
