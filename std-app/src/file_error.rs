@@ -18,7 +18,7 @@ impl FileError {
     }
 
     /// The error, for this file.
-    pub(crate) fn at(self, path: &Path) -> Self {
+    pub fn at(self, path: &Path) -> Self {
         Self { file: Some(path.to_owned()), ..self }
     }
 

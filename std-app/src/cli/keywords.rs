@@ -12,15 +12,14 @@ use halflight::save::Image;
 use halflight_core::scene::Camera;
 use std::ffi::OsString;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 /// Flags of a render, checked.
 pub struct Keywords(Render);
 
 /// Flags that concern files and messages of the program, not the picture, and parts of pictures.
-const WITHOUT: [&str; 14] = [
+const WITHOUT: [&str; 12] = [
     "output",
-    "report",
     "json",
     "exposure",
     "view",
@@ -31,7 +30,6 @@ const WITHOUT: [&str; 14] = [
     "progress",
     "quiet",
     "continue",
-    "aov",
     "crop",
 ];
 
@@ -73,14 +71,20 @@ fn keyword(arg: &Arg) -> Option<String> {
     Some(name.replace('-', "_"))
 }
 
-fn flag(command: &Command, name: &str) -> Option<Arg> {
-    command.get_arguments().find(|arg| keyword(arg).is_some_and(|keyword| keyword == name)).cloned()
+fn flag<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {
+    command.get_arguments().find(|arg| keyword(arg).is_some_and(|keyword| keyword == name))
+}
+
+/// The flags, built once: a render of a few milliseconds must not wait for them.
+fn command() -> MutexGuard<'static, Command> {
+    static COMMAND: LazyLock<Mutex<Command>> = LazyLock::new(|| Mutex::new(Words::command()));
+    COMMAND.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Keywords {
     /// Names of all keywords.
     pub fn names() -> Vec<String> {
-        Words::command().get_arguments().filter_map(keyword).collect()
+        names(&command())
     }
 
     /// Checks keywords and values as the command line checks them. `on` and `off` stand for a flag without a
@@ -89,10 +93,10 @@ impl Keywords {
     /// # Errors
     /// A keyword or a value that does not exist.
     pub fn parse(scene: &Path, given: &[(String, String)]) -> Result<Self, Refused> {
-        let mut command = Words::command();
+        let mut command = command();
         let mut words: Vec<OsString> = Vec::new();
         for (name, value) in given {
-            let Some(arg) = flag(&command, name) else { return Err(unknown(name)) };
+            let Some(arg) = flag(&command, name) else { return Err(unknown(&command, name)) };
             let long = arg.get_long().unwrap_or_default();
             if !arg.get_action().takes_values() {
                 words.extend((value != "off").then(|| format!("--{long}").into()));
@@ -128,10 +132,14 @@ impl Keywords {
     }
 }
 
+fn names(command: &Command) -> Vec<String> {
+    command.get_arguments().filter_map(keyword).collect()
+}
+
 /// The refusal of a name.
-fn unknown(name: &str) -> Refused {
+fn unknown(command: &Command, name: &str) -> Refused {
     let problem = format!("there is no setting `{name}`");
-    Refused { problem, help: format!("the settings are {}", Keywords::names().join(", ")) }
+    Refused { problem, help: format!("the settings are {}", names(command).join(", ")) }
 }
 
 /// The name of the keyword of a flag in messages, as `--spp <N>`.
@@ -185,11 +193,12 @@ mod tests {
     #[test]
     fn keywords_are_the_flags_of_a_picture() {
         let names = Keywords::names();
-        for name in ["spp", "time", "error", "size", "method", "eye", "cache_error", "precise", "checkpoint"]
+        for name in
+            ["spp", "time", "error", "size", "method", "eye", "cache_error", "precise", "aov", "report"]
         {
             assert!(names.iter().any(|known| known == name), "{name}");
         }
-        assert!(!names.iter().any(|name| ["output", "json", "report", "scene"].contains(&&**name)));
+        assert!(!names.iter().any(|name| ["output", "json", "scene"].contains(&&**name)));
     }
 
     #[test]

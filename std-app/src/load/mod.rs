@@ -140,6 +140,8 @@ struct SceneBuilder {
     materials: Vec<MtlMaterial>,
     /// Materials of the core that take the places of those, by index.
     given: HashMap<u32, Material>,
+    /// Pictures of those.
+    given_textures: TextureSet,
     /// Index of each material by OBJ file (`None`: the scene file) and name.
     material_numbers: HashMap<(Option<usize>, Name), u32>,
     /// Changes by the scene file, by name of the material.
@@ -166,6 +168,7 @@ impl SceneBuilder {
             own_materials: HashMap::new(),
             materials: Vec::new(),
             given: HashMap::new(),
+            given_textures: TextureSet::default(),
             material_numbers: HashMap::new(),
             overrides: BTreeMap::new(),
             used_overrides: BTreeSet::new(),
@@ -292,7 +295,8 @@ impl SceneBuilder {
         let files = maps.filter_map(file).filter(|_| options.textures);
         let required = self.overrides.values().flat_map(|change| change.material().maps.values());
         let required = required.chain(of_environment()).filter_map(file).collect();
-        let set = TextureSet::decode(files, &required, &self.embedded, &mut self.budget, &mut self.notes)?;
+        let given = core::mem::take(&mut self.given_textures);
+        let set = given.decode(files, &required, &self.embedded, &mut self.budget, &mut self.notes)?;
         self.embedded.clear();
         self.budget.give_back(core::mem::take(&mut self.held));
         Ok(set)

@@ -3,11 +3,14 @@
 use super::obj::{Group, Obj};
 use super::placed::{PlacedMesh, Placement};
 use super::placed_light::PlacedLight;
-use super::scene_file::EnvironmentChange;
+use super::scene_file::{self, EnvironmentChange};
+use super::texture::{self, Content};
+use super::texture_set::LONGEST_SIDE;
 use super::{LoadError, LoadOptions, LoadedScene, SceneBuilder, View, memory_estimate, too_large};
+use crate::picture::Picture;
 use glam::Mat3;
 use halflight_core::Rgb;
-use halflight_core::scene::{Material, PointLight};
+use halflight_core::scene::{Material, PointLight, TextureId};
 use std::path::Path;
 
 /// A material of [`SceneParts`].
@@ -50,7 +53,7 @@ pub struct PartMesh<'a> {
 pub struct SceneParts {
     builder: SceneBuilder,
     options: LoadOptions,
-    environment: Option<Rgb>,
+    environment: Option<EnvironmentChange>,
     view: Option<(View, f64)>,
 }
 
@@ -125,9 +128,68 @@ impl SceneParts {
         self.builder.lights.push(PlacedLight::new(light));
     }
 
+    /// Adds a picture as a texture: of colours, whose bytes are in the sRGB curve, or of numbers. Texture
+    /// coordinates (0, 1) are the first pixel of the first row.
+    ///
+    /// # Errors
+    /// A [`LoadError`] with `name`: a picture without pixels or with more than 32768 a side; insufficient memory.
+    pub fn texture(
+        &mut self,
+        name: &str,
+        picture: Picture,
+        has_colours: bool,
+    ) -> Result<TextureId, LoadError> {
+        let picture = self.prepared(name, picture)?;
+        let content = if has_colours { Content::Colour } else { Content::Data };
+        Ok(self.builder.given_textures.add(picture, content))
+    }
+
+    /// A picture with finite texels, whose memory is taken.
+    fn prepared(&mut self, name: &str, picture: Picture) -> Result<Picture, LoadError> {
+        let name = Path::new(name);
+        let Picture { width, height, .. } = picture;
+        if width.min(height) == 0 || width.max(height) > LONGEST_SIDE || !picture.is_complete() {
+            let problem = format!("the picture has {width}x{height} pixels");
+            let help = format!("a texture has 1 to {LONGEST_SIDE} pixels a side");
+            return Err(LoadError::of_file(name, problem, help));
+        }
+        let SceneBuilder { budget, notes, .. } = &mut self.builder;
+        let mut picture = texture::prepared(picture);
+        texture::note(&mut picture, name, notes);
+        budget.take(picture.bytes()).map_err(|why| too_large(name, &why))?;
+        Ok(picture)
+    }
+
     /// Gives rays that leave the scene this radiance.
     pub fn environment(&mut self, radiance: Rgb) {
-        self.environment = Some(radiance);
+        self.environment = Some(EnvironmentChange::of_radiance(radiance));
+    }
+
+    /// Gives rays that leave the scene the radiances of a picture of all directions, as `map` of a scene file
+    /// has them, times `radiance`. `to_world` is a rotation.
+    ///
+    /// # Errors
+    /// Those of [`SceneParts::texture`].
+    pub fn environment_map(
+        &mut self,
+        picture: Picture,
+        radiance: Rgb,
+        to_world: Mat3,
+    ) -> Result<(), LoadError> {
+        let picture = Some(self.prepared("environment", picture)?);
+        let to_map = to_world.transpose();
+        self.environment =
+            Some(EnvironmentChange { picture, to_map, ..EnvironmentChange::of_radiance(radiance) });
+        Ok(())
+    }
+
+    /// Sets the light from afar by `text`, which has the `[sky]` of a scene file.
+    ///
+    /// # Errors
+    /// Those of a scene file called `sky`.
+    pub fn sky(&mut self, text: &str) -> Result<(), LoadError> {
+        self.environment = scene_file::environment(text, Path::new("sky"), &mut self.builder.budget)?;
+        Ok(())
     }
 
     /// Sets the camera.
@@ -142,14 +204,7 @@ impl SceneParts {
     pub fn build(self) -> Result<LoadedScene, LoadError> {
         let Self { builder, options, environment, view } = self;
         let name = Path::new("scene");
-        let sky = |radiance| EnvironmentChange {
-            radiance,
-            map: None,
-            picture: None,
-            to_map: Mat3::IDENTITY,
-            disc: None,
-        };
-        let mut loaded = builder.build(name, &options, environment.map(sky))?;
+        let mut loaded = builder.build(name, &options, environment)?;
         loaded.files.clear();
         if let Some((view, fov_degrees)) = view {
             let camera = loaded.camera_at(view, fov_degrees).ok_or_else(|| {

@@ -1,8 +1,10 @@
 //! Pictures as textures and environment maps: finite values that are not negative, and their views for the
 //! core.
 
+use super::notes::Notes;
 use crate::picture::{Picture, Samples};
 use halflight_core::scene::{Texels, Texture, TextureTransform, Wrap};
+use std::path::Path;
 
 /// Least replacement of an infinite texel: the largest half float.
 const LARGEST_HALF: f32 = 65504.0;
@@ -59,6 +61,13 @@ pub(super) fn prepared(mut picture: Picture) -> Picture {
         }
     }
     picture
+}
+
+/// Moves the notes of a picture to those of the load.
+pub(super) fn note(picture: &mut Picture, name: &Path, notes: &mut Notes) {
+    for note in picture.notes.drain(..) {
+        notes.add(1, format!("picture {}: {note}", name.display()));
+    }
 }
 
 /// A view for the core. Bytes are colours in the sRGB curve, or numbers; floats are both.

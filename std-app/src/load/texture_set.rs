@@ -20,7 +20,7 @@ const ALPHA: u8 = 3;
 /// Luminance of linear sRGB (IEC 61966-2-1).
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// Longest side of a texture in pixels.
-const LONGEST_SIDE: u32 = 1 << 15;
+pub(super) const LONGEST_SIDE: u32 = 1 << 15;
 
 /// Pictures within other files, by the names that their maps have.
 pub(super) type Embedded = HashMap<PathBuf, Bytes>;
@@ -48,12 +48,13 @@ struct View {
 }
 
 impl TextureSet {
-    /// Decodes each of `files` once, in parallel as far as `budget` allows. Pixels stay taken from the
+    /// Adds the pictures of `files`, each once, in parallel as far as `budget` allows. Pixels stay taken from the
     /// budget.
     ///
     /// # Errors
     /// A `required` picture that is unreadable or too large; others are left out with a note.
     pub(super) fn decode(
+        mut self,
         files: impl Iterator<Item = PathBuf>,
         required: &BTreeSet<PathBuf>,
         embedded: &Embedded,
@@ -62,7 +63,6 @@ impl TextureSet {
     ) -> Result<Self, LoadError> {
         let mut known = HashSet::new();
         let unique: Vec<PathBuf> = files.filter(|file| known.insert(file.clone())).collect();
-        let mut set = Self::default();
         let mut rest = &unique[..];
         while !rest.is_empty() {
             // Headers are read one after the other: the set of pictures that fit does not depend on threads.
@@ -79,10 +79,10 @@ impl TextureSet {
                 }
                 rest = later;
             }
-            set.decode_batch(&batch, required, embedded, budget, notes)?;
+            self.decode_batch(&batch, required, embedded, budget, notes)?;
         }
-        set.spare = budget.left();
-        Ok(set)
+        self.spare = budget.left();
+        Ok(self)
     }
 
     fn decode_batch(
@@ -102,9 +102,7 @@ impl TextureSet {
             match result {
                 Err(why) => leave_out(file, &why, required, notes)?,
                 Ok(mut picture) => {
-                    for note in picture.notes.drain(..) {
-                        notes.add(1, format!("picture {}: {note}", file.display()));
-                    }
+                    texture::note(&mut picture, file, notes);
                     budget.take(picture.bytes()).map_err(|why| refusal(file, &why))?;
                     self.by_file.insert((*file).clone(), self.pictures.len());
                     self.pictures.push(picture);
@@ -124,10 +122,11 @@ impl TextureSet {
         Some(id)
     }
 
-    /// A view of a picture of linear colours that is no file.
-    pub(super) fn add(&mut self, picture: Picture) -> TextureId {
+    /// A view of a prepared picture that is no file.
+    pub(super) fn add(&mut self, picture: Picture, content: Content) -> TextureId {
+        let content = stored(&picture, content);
         self.pictures.push(picture);
-        self.view_of(self.pictures.len() - 1, &Map::default(), Content::Data)
+        self.view_of(self.pictures.len() - 1, &Map::default(), content)
     }
 
     /// The picture of a map as numbers.
@@ -261,10 +260,7 @@ impl TextureSet {
 
     fn view(&mut self, map: &Map, content: Content) -> Option<TextureId> {
         let picture = *self.by_file.get(map.found.as_ref()?)?;
-        let content = match (&self.pictures[picture].samples, content) {
-            (Samples::Floats { .. }, Content::Colour) => Content::Data,
-            _ => content,
-        };
+        let content = stored(&self.pictures[picture], content);
         Some(self.view_of(picture, map, content))
     }
 
@@ -280,6 +276,14 @@ impl TextureSet {
             self.views.len() - 1
         });
         TextureId(id as u32)
+    }
+}
+
+/// The content of a view: floats are linear, as colours and as numbers.
+fn stored(picture: &Picture, content: Content) -> Content {
+    match (&picture.samples, content) {
+        (Samples::Floats { .. }, Content::Colour) => Content::Data,
+        _ => content,
     }
 }
 

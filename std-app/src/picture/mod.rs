@@ -56,6 +56,18 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// True if there are as many samples as the size says.
+    pub(crate) fn is_complete(&self) -> bool {
+        let pixels = self.width as usize * self.height as usize;
+        match &self.samples {
+            Samples::Bytes(samples) => samples.len() == 4 * pixels,
+            Samples::Words(samples) => samples.len() == 4 * pixels,
+            Samples::Floats { rgb, alpha } => {
+                rgb.len() == pixels && (alpha.is_empty() || alpha.len() == pixels)
+            }
+        }
+    }
+
     /// Bytes of the pixels.
     pub fn bytes(&self) -> usize {
         match &self.samples {

@@ -83,6 +83,12 @@ impl<'i> ExrFile<'i> {
         }
     }
 
+    /// Names of the channels beside the picture, and their values, row by row from the top.
+    pub fn channels(&self) -> impl Iterator<Item = (&str, Vec<f32>)> {
+        let pixels = self.image.pixels.len();
+        self.layers.list.iter().map(move |(name, value)| (&**name, (0..pixels).map(value).collect()))
+    }
+
     /// The bytes of the file.
     ///
     /// # Errors

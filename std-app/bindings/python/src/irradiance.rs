@@ -6,7 +6,7 @@ use crate::scene::Renderer;
 use crate::watch::{State, watched};
 use halflight::bake::{BakeProgress, BakeSettings, Quantity, Sensor};
 use halflight::render::Stop;
-use halflight_core::{IrradiancePoint, LightPart};
+use halflight_core::{IrradiancePoint, LightPart, PointMethod};
 use numpy::PyReadonlyArray2;
 use pyo3::exceptions::PyBaseException;
 use pyo3::prelude::*;
@@ -25,10 +25,11 @@ pub(crate) struct PointKeywords {
     max_depth: Option<u32>,
     threads: Option<usize>,
     back_faces: bool,
+    method: String,
 }
 
 impl PointKeywords {
-    fn settings(&self, py: Python<'_>, memory: Option<usize>) -> PyResult<BakeSettings> {
+    pub(crate) fn settings(&self, py: Python<'_>, memory: Option<usize>) -> PyResult<BakeSettings> {
         let Self { spp, seconds, error, seed, max_depth, threads, back_faces, caustics, .. } = *self;
         let stop = Stop { spp, seconds, error };
         let light = match self.light.as_str() {
@@ -40,7 +41,17 @@ impl PointKeywords {
                 return Err(invalid(py, &problem));
             }
         };
+        let method = match self.method.as_str() {
+            "path" => PointMethod::Path,
+            "irradiance-cache" => PointMethod::IrradianceCache,
+            "auto" => PointMethod::Auto,
+            method => {
+                let problem = format!("method={method}: expected one of path, irradiance-cache, auto");
+                return Err(invalid(py, &problem));
+            }
+        };
         Ok(BakeSettings {
+            method,
             stop: if stop == Stop::default() { BakeSettings::SENSIBLE } else { stop },
             light,
             caustics,
@@ -94,7 +105,7 @@ pub(crate) fn irradiance<'py>(
 }
 
 /// Numbers of a progress.
-fn state(progress: &BakeProgress) -> State {
+pub(crate) fn state(progress: &BakeProgress) -> State {
     let [all, within] = progress.tiles;
     let (seconds, seconds_left) = (progress.seconds, progress.seconds_left);
     State { seconds, seconds_left, spp: progress.samples, error: None, tiles: Some((all, within)) }

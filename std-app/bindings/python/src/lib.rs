@@ -3,6 +3,7 @@
 mod arrays;
 mod error;
 mod irradiance;
+mod lightmap;
 mod parts;
 mod picture;
 mod scene;
@@ -17,6 +18,8 @@ use std::process::ExitCode;
 mod _halflight {
     #[pymodule_export]
     use crate::irradiance::irradiance;
+    #[pymodule_export]
+    use crate::lightmap::{Lightmap, lightmap};
     #[pymodule_export]
     use crate::picture::{Rendered, keywords, render};
     #[pymodule_export]

@@ -1,19 +1,21 @@
 //! Renders, and their pictures with estimates of the error.
 
-use crate::arrays::{image, pixels};
+use crate::arrays::{array, image, pixels};
 use crate::error::{invalid, raised, refused};
 use crate::scene::Renderer;
 use crate::watch::{State, watched};
 use halflight::cli::Keywords;
 use halflight::compare::compare;
+use halflight::layers::{Facts, LayerSource, add_layers};
+use halflight::load::LoadedScene;
 use halflight::render::{Progress, RenderResult, Settings};
 use halflight::report::{Provenance, Run, check_folder, write_folder};
-use halflight::save::{Curve, Image, Patience, ViewTransform, automatic_stops};
+use halflight::save::{Curve, ExrFile, Image, Patience, ViewTransform, automatic_stops, write_exr};
 use halflight_core::scene::Camera;
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3};
 use pyo3::exceptions::PyBaseException;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -51,6 +53,9 @@ pub(crate) fn render<'py>(
     let chosen = parsed.settings(inner.scene(), reference);
     let (mut settings, camera) = chosen.map_err(|error| refused(py, &error))?;
     settings.memory = settings.memory.or(renderer.memory);
+    if let Some((_, folder)) = words.iter().find(|(name, _)| name == "report") {
+        check_folder(folder.as_ref()).map_err(|error| raised(py, error))?;
+    }
     let (result, ended) = watched(py, callback.as_ref(), |reporter, interrupt| {
         let mut progress = |progress: &Progress| reporter.report(state(progress), || progress.picture());
         inner.render_with(camera, &settings, &mut progress, interrupt)
@@ -83,7 +88,7 @@ impl Rendered {
         let shown = core::mem::replace(&mut result.image, empty());
         let variance = core::mem::replace(&mut result.variance, empty());
         let shape = (shown.height as usize, shown.width as usize);
-        let samples = crate::arrays::array(py, shape, core::mem::take(&mut result.samples))?;
+        let samples = array(py, shape, core::mem::take(&mut result.samples))?;
         let (image, variance) = (pixels(py, shown)?.unbind(), pixels(py, variance)?.unbind());
         Ok(Self { scene, settings, camera, result, image, variance, samples: samples.unbind() })
     }
@@ -99,7 +104,11 @@ impl Rendered {
     }
 
     /// Calls `with` the facts of a report.
-    fn described<T: Send>(&self, py: Python<'_>, with: impl FnOnce(&Run) -> T + Send) -> PyResult<T> {
+    fn described<T: Send>(
+        &self,
+        py: Python<'_>,
+        with: impl FnOnce(&Run, &LoadedScene) -> T + Send,
+    ) -> PyResult<T> {
         let result = self.whole(py)?;
         let renderer = self.scene.get();
         let scene = renderer.inner()?.scene();
@@ -109,7 +118,7 @@ impl Rendered {
             // Both have the same size.
             let comparison = reference.and_then(|reference| compare(&result.image, reference).ok());
             let views = scene.views();
-            with(&Run {
+            let run = Run {
                 scene: &views.scene(self.camera),
                 name: &name,
                 repairs: &scene.repairs,
@@ -120,9 +129,22 @@ impl Rendered {
                 load_seconds: 0.0,
                 total_seconds: result.seconds.build + result.seconds.render,
                 provenance: &Provenance::here(),
-            })
+            };
+            with(&run, scene)
         };
         Ok(py.detach(described))
+    }
+
+    /// Calls `with` the picture, its layers and its facts as an OpenEXR file.
+    fn exr<T: Send>(&self, py: Python<'_>, with: impl FnOnce(ExrFile) -> T + Send) -> PyResult<T> {
+        self.described(py, |run, scene| {
+            let mut file = ExrFile::of(&run.result.image);
+            Facts::of_render(run.result, (run.name, run.settings), run.provenance).add_to(&mut file);
+            if let Some(wanted) = &self.settings.layers {
+                add_layers(&mut file, &wanted.layers, &LayerSource::new(run.result, scene));
+            }
+            with(file)
+        })
     }
 }
 
@@ -187,16 +209,34 @@ impl Rendered {
 
     /// The object that `halflight render --json` prints, as text.
     fn object(&self, py: Python<'_>) -> PyResult<String> {
-        self.described(py, |run| run.object().to_string())
+        self.described(py, |run, _| run.object().to_string())
     }
 
     /// Writes a report into a folder.
     fn report(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         check_folder(&folder).map_err(|error| raised(py, error))?;
-        let files = self.described(py, |run| run.files())?;
+        let files = self.described(py, |run, _| run.files())?;
         let written = py.detach(|| write_folder(&folder, &files, Patience::least()));
         let failed = written.err().and_then(|errors| errors.into_iter().next());
         failed.map_or(Ok(()), |error| Err(raised(py, error)))
+    }
+
+    /// The channels of the layers by name, (rows, columns) each.
+    fn layers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let owned = |(name, values): (&str, Vec<f32>)| (name.to_owned(), values);
+        let channels: Vec<_> = self.exr(py, |file| file.channels().map(owned).collect())?;
+        let shape = (self.settings.height as usize, self.settings.width as usize);
+        let dict = PyDict::new(py);
+        for (name, values) in channels {
+            dict.set_item(name, array(py, shape, values)?)?;
+        }
+        Ok(dict)
+    }
+
+    /// Writes an OpenEXR file with the layers and facts of the render.
+    fn save_exr(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let written = self.exr(py, |file| write_exr(&path, file, Patience::least()))?;
+        written.map_err(|error| raised(py, error))
     }
 
     /// The bytes of a PNG file.

@@ -2,7 +2,7 @@
 
 use crate::arrays::{array, rows};
 use crate::error::{invalid, raised};
-use crate::parts::{LightParts, MaterialParts, MeshParts, ViewParts, loaded};
+use crate::parts::{EnvironmentParts, LightParts, MaterialParts, MeshParts, TextureParts, ViewParts, loaded};
 use halflight::load::{LoadOptions, LoadedScene, load};
 use halflight_core::geometry::{MISS, Ray};
 use halflight_core::parts::rays::SurfacePoint;
@@ -50,10 +50,11 @@ impl Renderer {
     }
 }
 
-/// Loads a scene file or a mesh, and builds its structures within `memory` bytes.
+/// Loads a scene file or a mesh, and builds its structures within `memory` bytes. With `charts` its texture
+/// coordinates are those of the files.
 #[pyfunction]
-pub(crate) fn open(py: Python<'_>, path: PathBuf, memory: Option<usize>) -> PyResult<Renderer> {
-    let options = LoadOptions { memory, ..LoadOptions::default() };
+pub(crate) fn open(py: Python<'_>, path: PathBuf, memory: Option<usize>, charts: bool) -> PyResult<Renderer> {
+    let options = LoadOptions { memory, keeps_texcoords: charts, ..LoadOptions::default() };
     let scene = py.detach(|| load(&path, &options)).map_err(|error| raised(py, error))?;
     Renderer::new(py, path, scene, memory)
 }
@@ -63,13 +64,13 @@ pub(crate) fn open(py: Python<'_>, path: PathBuf, memory: Option<usize>) -> PyRe
 pub(crate) fn build(
     py: Python<'_>,
     meshes: Vec<MeshParts<'_>>,
-    materials: Vec<MaterialParts>,
+    materials: (Vec<TextureParts<'_>>, Vec<MaterialParts>),
     lights: Vec<LightParts>,
-    environment: Option<[f32; 3]>,
+    environment: Option<EnvironmentParts<'_>>,
     view: Option<ViewParts>,
     memory: Option<usize>,
 ) -> PyResult<Renderer> {
-    let scene = loaded(py, (&meshes, &materials), &lights, (environment, view), memory)?;
+    let scene = loaded(py, &meshes, materials, &lights, (environment, view), memory)?;
     Renderer::new(py, "scene".into(), scene, memory)
 }
 
@@ -111,6 +112,19 @@ impl Renderer {
         let scene = self.scene();
         let positions = scene.positions.iter().flat_map(|&at| scene.transform.to_user(at.into())).collect();
         array(py, (scene.positions.len(), 3), positions)
+    }
+
+    /// Texture coordinates of the vertices; none without textures or charts.
+    #[getter]
+    fn texcoords<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let texcoords = &self.scene().texcoords;
+        array(py, (texcoords.len(), 2), texcoords.as_flattened().to_vec())
+    }
+
+    /// Names of the objects, to which numbers of layers refer.
+    #[getter]
+    fn object_names(&self) -> Vec<String> {
+        self.scene().object_names.clone()
     }
 
     /// Corners of the triangles.

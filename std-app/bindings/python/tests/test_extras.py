@@ -160,3 +160,59 @@ def test_a_planted_blur_is_found():
     for refused in ((pair[0], pair[0]), (pair[0], scene.render(**(settings | {"spp": 2})))):
         with pytest.raises(hl.Error):
             denoise(*refused)
+
+
+def test_the_halves_of_one_picture_estimate_its_error():
+    from halflight_render.denoising import denoise
+
+    scene = hl.open(CORNELL)
+    settings = {"size": (64, 64), "method": "path", "reconstruct": False, "caustics": False, "layers": ["halves"]}
+    reference = scene.render(spp=512, seed=99, **settings)
+    pair = [scene.render(spp=16, seed=seed, **settings) for seed in (0, 1)]
+    for found, halves in (
+        (denoise(pair[0], denoiser=smoothed), pair[0].halves),
+        (denoise(*pair, denoiser=smoothed), [picture.image for picture in pair]),
+    ):
+        half = np.mean([hl.compare(smoothed(image), reference).relmse for image in halves])
+        assert found.upper == pytest.approx(half, rel=0.3)
+        assert 0.5 * found.upper <= found.relmse <= found.upper
+    with pytest.raises(hl.SettingsError, match="layers=.'halves'"):
+        denoise(scene.render(spp=16, size=(16, 16), method="path", reconstruct=False))
+
+
+def test_a_filter_that_lies_about_halves_is_found_out():
+    from halflight_render.denoising import denoise
+
+    scene = hl.open(CORNELL)
+    settings = {"size": (48, 48), "method": "path", "reconstruct": False, "spp": 16, "layers": ["halves"]}
+    pair = [scene.render(seed=seed, **settings) for seed in (0, 1)]
+    mean = (pair[0].image.astype(np.float64) + pair[1].image) / 2
+
+    def lying(image):
+        return 2 * image if np.allclose(image, mean, rtol=1e-4) else image
+
+    honest, found = denoise(*pair, denoiser=lambda image: image), denoise(*pair, denoiser=lying)
+    # The picture of both is twice as bright as the scene: its relMSE is about 1.
+    assert honest.relmse < 0.1 and found.relmse > 0.5
+
+
+def test_the_grid_of_an_octree_is_that_of_its_files(tmp_path):
+    radiance = pytest.importorskip("pyradiance")
+    from halflight_render import daylight
+
+    described = radiance.gendaylit(NOON, **PLACE, dirnorm=800, diffhor=120).decode()
+    glow = "skyfunc glow glow 0 0 4 1 1 1 0\nglow source sky 0 0 4 0 0 1 180\nglow source earth 0 0 4 0 0 -1 180\n"
+    (tmp_path / "clear.sky").write_text(described + glow)
+    (tmp_path / "room.rad").write_text(ROOM)
+    (tmp_path / "desk.pts").write_text("1 2 1.2 0 0 1\n2 4 1.2 0 0 1\n")
+    with open(tmp_path / "scene.oct", "wb") as octree:
+        subprocess.run([f"{radiance.BINPATH}/oconv", "clear.sky", "room.rad"], cwd=tmp_path, stdout=octree, check=True)
+    output = tmp_path / "desk.res"
+    values, found = daylight.point_in_time(tmp_path / "scene.oct", tmp_path / "desk.pts", spp=64, output=output)
+    room = daylight.scene([tmp_path / "room.rad"], sky=daylight.sky(described))
+    same = room.irradiance([[1, 2, 1.2], [2, 4, 1.2]], (0, 0, 1), spp=64)
+    assert found.rgb == pytest.approx(same.rgb, rel=1e-3) and (values > 10).all()
+    assert values == pytest.approx(same.rgb @ [0.265, 0.67, 0.065] * 179, rel=1e-3)
+    assert np.loadtxt(output) == pytest.approx(values, rel=1e-6)
+    with pytest.raises(hl.SceneError, match="no octree"):
+        daylight.of_octree(tmp_path / "room.rad")

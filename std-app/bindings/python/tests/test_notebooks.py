@@ -9,7 +9,7 @@ nbclient = pytest.importorskip("nbclient")
 nbformat = pytest.importorskip("nbformat")
 
 FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
-EXTRAS = {"daylight": "pyradiance", "denoising": "pyoidn"}
+EXTRAS = {"daylight": "pyradiance", "denoising": "pyoidn", "lightmap": "matplotlib"}
 
 
 @pytest.mark.parametrize("file", sorted(FOLDER.glob("*.ipynb")), ids=lambda file: file.stem)
@@ -23,7 +23,7 @@ def test_notebooks_run(file, tmp_path):
     shutil.copytree(FOLDER.parents[3] / "scenes" / "cornell", tmp_path / "scenes" / "cornell")
     notebook = nbformat.read(file, as_version=4)
     done = nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
-    if file.stem == "picture":
+    if file.stem in ("picture", "lightmap"):
         outputs = [output for cell in done.cells if cell.cell_type == "code" for output in cell.outputs]
         shown = next(output for output in outputs if "image/png" in output.get("data", {}))
-        assert "relMSE" in shown["data"]["text/html"]
+        assert file.stem != "picture" or "relMSE" in shown["data"]["text/html"]

@@ -22,10 +22,12 @@ def test_bits_are_those_of_the_program(cornell, cornell_path, tmp_path):
     for method in ("path", "irradiance-cache", "vcm"):
         file = tmp_path / f"{method}.pfm"
         done = program(
-            "render", cornell_path, "--spp", 8, "--size", "48x32", "--method", method, "-o", file, "--json"
+            "render", cornell_path, "--spp", 8, "--size", "48x32", "--method", method, "-o", file, "--json",
+            "--audit", "off",
         )
         assert done.returncode == 0, done.stderr
-        picture = cornell.render(spp=8, size=(48, 32), method=method)
+        # An audit takes a share of the time, which no two renders have in common.
+        picture = cornell.render(spp=8, size=(48, 32), method=method, audit=False)
         assert np.array_equal(hl.read_image(file), picture.image)
         printed = json.loads(done.stdout)
         assert printed["error"]["relmse"] == pytest.approx(picture.relmse, rel=1e-12)

@@ -163,3 +163,136 @@ def test_points_that_do_not_fit_are_refused(floor):
     ):
         with pytest.raises(hl.Error):
             floor.irradiance(points, normals, spp=4)
+
+
+#: Texture coordinates of the square, whose first corner is at the top left of a picture.
+UV = np.array([[0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+
+#: A picture of four fields.
+FIELDS = np.array([[[0.9, 0.1, 0.1], [0.1, 0.9, 0.1]], [[0.1, 0.1, 0.9], [0.5, 0.5, 0.5]]])
+
+
+def above(material, **keywords):
+    """A square with texture coordinates below a white sky, seen from above with its first corner at the top left."""
+    floor = hl.Mesh(SQUARE, TRIANGLES, material, texcoords=UV, name="floor")
+    camera = hl.Camera(eye=(0, 3, 0), look_at=(0, 0, 0), up=(0, 0, -1), fov=2 * np.degrees(np.arctan(1 / 3)))
+    return hl.Scene([floor], environment=1.0, camera=camera, **keywords)
+
+
+def seen(scene, **keywords):
+    return scene.render(spp=64, size=(8, 8), method="path", reconstruct=False, **keywords).image
+
+
+def enlarged(picture, times):
+    return np.kron(picture, np.ones((times, times, 1)))
+
+
+def test_textures_have_their_first_pixel_at_the_top_left():
+    # 16 texels a field: all but the edges of fields are constant.
+    image = seen(above(hl.diffuse(enlarged(FIELDS, 16))))
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        field = image[4 * row + 1 : 4 * row + 3, 4 * column + 1 : 4 * column + 3]
+        # A floor below a white sky shows its reflectance.
+        assert field == pytest.approx(np.broadcast_to(FIELDS[row, column], (2, 2, 3)), rel=0.03)
+
+
+def test_bytes_are_in_the_srgb_curve():
+    half = np.full((4, 4, 3), 188, np.uint8)
+    assert seen(above(hl.diffuse(half))) == pytest.approx(0.5029, rel=0.02)
+    grey = np.full((4, 4), 188, np.uint8)
+    assert seen(above(hl.diffuse(grey))) == pytest.approx(0.5029, rel=0.02)
+
+
+def test_every_input_of_a_material_may_be_a_texture():
+    ones = np.ones((4, 4), np.float32)
+    plain = seen(above(hl.coated(0.5, 0.4, specular=0.1, metallic=0.3)))
+    mapped = hl.coated(0.5 * ones, 0.4 * ones, specular=0.1 * ones, metallic=0.3 * ones)
+    assert seen(above(mapped)) == pytest.approx(plain, rel=1e-4)
+    lamp = seen(above(hl.lamp(enlarged(3 * FIELDS, 16))))
+    assert lamp[1, 1] == pytest.approx(3 * FIELDS[0, 0], rel=1e-4)
+    # Rays that pass the holes see the white sky.
+    holes = seen(above(hl.diffuse(0.2).cut_out(enlarged(np.array([[[0.0], [1.0]]]), 16)[..., 0])))
+    assert holes[4, 1] == pytest.approx(1, rel=1e-3) and holes[4, 6] == pytest.approx(0.2, rel=0.05)
+
+
+def test_normal_and_height_maps_turn_the_normal():
+    # 45 degrees towards +u, which is +x.
+    normals = np.broadcast_to([0.5 + 0.5 * np.sqrt(0.5), 0.5, 0.5 + 0.5 * np.sqrt(0.5)], (4, 4, 3))
+    ramp = np.tile(np.linspace(1, 0, 64), (64, 1))
+    for material in (hl.diffuse(0.5).with_normals(normals), hl.diffuse(0.5).bumped(ramp, 0.5)):
+        layers = above(material).render(spp=4, size=(9, 9), layers=["normal"])
+        x, y, z = layers.normal[4, 4]
+        assert x > 0.3 and y > 0.5 and abs(z) < 0.05
+
+
+def test_textures_are_repaired_with_notes():
+    broken = np.full((4, 4, 3), 0.5, np.float32)
+    broken[0, 0] = [np.nan, -1, 0.5]
+    scene = above(hl.diffuse(broken))
+    assert any("color of material 0" in note and "NaN or negative are set to 0, 2 times" in note for note in scene.notes)
+    assert np.isfinite(seen(scene)).all()
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda: hl.diffuse(np.full((4, 4, 3), 2.0)), "reflectance has values up to 2"),
+        (lambda: hl.diffuse(np.zeros((4, 4, 4))), r"reflectance has the shape \(4, 4, 4\).*opacity"),
+        (lambda: hl.diffuse(np.zeros((4, 4, 3), int)), "reflectance is of type int64"),
+        (lambda: hl.metal(0.5, np.zeros((4, 4, 3))), r"roughness has the shape \(4, 4, 3\)"),
+        (lambda: hl.metal(0.5, (0.1, 0.2)), "roughness is"),
+        (lambda: hl.diffuse("red"), "reflectance is 'red'"),
+        (lambda: hl.Material("wood"), "kind='wood': expected one of"),
+        (lambda: hl.Scene([], environment=np.zeros((2, 4, 3), np.uint8)), "environment has bytes"),
+        (lambda: hl.Scene([], environment=hl.Environment(np.ones((2, 4, 3)), to_world=np.ones((3, 3)))), "to_world"),
+        (lambda: hl.Scene([], ["lamp"]), "lights have a str"),
+    ],
+)
+def test_errors_name_the_argument(make, problem):
+    with pytest.raises(hl.SettingsError, match=problem):
+        make()
+
+
+def test_environments_are_pictures_of_all_directions():
+    # The upper half is white, the lower one black: the floor receives the light of the upper half.
+    picture = np.zeros((32, 64, 3))
+    picture[:16] = 1.0
+    mesh = hl.Mesh(SQUARE, TRIANGLES, hl.diffuse(0.5))
+    up = hl.Scene([mesh], environment=picture).irradiance([[0, 0, 0]], [[0, 1, 0]], spp=1024)
+    assert up.value[0] == pytest.approx(np.pi, rel=0.02)
+    # Turned by half a circle about x.
+    turned = hl.Environment(picture, radiance=2.0, to_world=np.diag([1.0, -1.0, -1.0]))
+    down = hl.Scene([mesh], environment=turned).irradiance([[0, 0, 0], [0, -1, 0]], [[0, 1, 0], [0, -1, 0]], spp=1024)
+    assert down.value == pytest.approx([0, 2 * np.pi], rel=0.02, abs=0.05)
+
+
+def test_skies_are_those_of_scene_files(tmp_path):
+    lines = [f"v {x} {y} {z}" for x, y, z in SQUARE] + ["f 1 2 3", "f 1 3 4"]
+    (tmp_path / "a.obj").write_text("\n".join(lines) + "\n")
+    place = 'date = "2026-06-21"\ntime = "12:00+00:00"\nlatitude = 47\nlongitude = 8\n'
+    (tmp_path / "a.toml").write_text('[[mesh]]\nfile = "a.obj"\n[sky]\nturbidity = 4\n' + place)
+    sky = hl.Sky(date="2026-06-21", time="12:00+00:00", latitude=47, longitude=8, turbidity=4)
+    mesh = hl.Mesh(SQUARE, TRIANGLES)
+    given = ([[0, 0.5, 0]], [[0, 1, 0]])
+    by_file, by_array = (
+        scene.irradiance(*given, spp=64).value[0] for scene in (hl.open(tmp_path / "a.toml"), hl.Scene([mesh], environment=sky))
+    )
+    assert by_file == by_array > 100
+    for sky, problem in (
+        (hl.Sky(), "position of the sun is unknown"),
+        (hl.Sky(sun=(0, -1, 0)), "below the horizon"),
+        (hl.Sky(date="noon", time="12:00Z", latitude=1, longitude=1), "^date of the sky: the calendar"),
+        (hl.Sky(sun=(0, 1, 0), turbidity=90), "^turbidity of the sky: "),
+    ):
+        with pytest.raises(hl.SceneError, match=problem):
+            hl.Scene([mesh], environment=sky)
+
+
+def test_panes_pass_light_and_plastic_has_a_coat():
+    window = hl.Mesh(SQUARE + [0, 1, 0], TRIANGLES, hl.pane(1.5, tint=0.5))
+    floor = hl.Mesh(SQUARE * 0.1, TRIANGLES, hl.diffuse(0.5))
+    lit = hl.Scene([window, floor], [hl.Directional((0, -1, 0), 1.0)]).irradiance([[0, 0, 0]], [[0, 1, 0]], spp=64)
+    # Two faces of reflectance 0.04 with a body of transmittance 0.5 between: 0.96² · 0.5 / (1 - 0.04² · 0.5²).
+    assert lit.value[0] == pytest.approx(0.96**2 * 0.5 / (1 - 0.0004), rel=1e-3)
+    shiny = hl.plastic(0.2, ior=1.5)
+    assert shiny.specular == pytest.approx([0.04] * 3) and shiny.ior == 1.5

@@ -3,6 +3,7 @@
 use super::values::{BRIGHTEST, Colour, Matrix, Rotation};
 use super::{LoadError, Source};
 use crate::load::map::Map;
+use crate::load::texture::Content;
 use crate::load::texture_set::TextureSet;
 use crate::load::transform::{SceneTransform, direction as direction_between};
 use crate::picture::Picture;
@@ -74,10 +75,15 @@ pub(in crate::load) struct EnvironmentChange {
 }
 
 impl EnvironmentChange {
+    /// An environment of one radiance.
+    pub(in crate::load) fn of_radiance(radiance: Rgb) -> Self {
+        Self { radiance, map: None, picture: None, to_map: Mat3::IDENTITY, disc: None }
+    }
+
     /// The environment, with its map among `textures`.
     pub(in crate::load) fn in_core(self, textures: &mut TextureSet) -> Environment {
         let map = match self.picture {
-            Some(picture) => Some(textures.add(picture)),
+            Some(picture) => Some(textures.add(picture, Content::Colour)),
             None => textures.colour(self.map.as_ref()),
         };
         Environment { radiance: self.radiance, map, to_map: self.to_map, disc: self.disc }

@@ -25,6 +25,7 @@ use super::map::Map;
 use super::notes::Notes;
 use super::scene::{LoadedScene, RenderSettings};
 use super::{LoadOptions, SceneBuilder, memory_estimate, read, too_large};
+use crate::memory::Budget;
 use crate::values::Number;
 use core::cell::RefCell;
 use core::ops::Range;
@@ -177,15 +178,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     }
     let mesh_files: Vec<PathBuf> =
         scene.mesh.iter().map(|mesh| mesh.checked_file(&scene, &source)).collect::<Result<_, _>>()?;
-    let environment = match (&scene.environment, &scene.sky) {
-        (Some(_), Some(sky)) => {
-            let problem = "this scene file has a [sky] and an [environment]";
-            return Err(source.error(sky.span(), problem, "leave out one of them"));
-        }
-        (Some(entry), None) => Some(entry.resolved(&source)?),
-        (None, Some(entry)) => Some(sky::environment(entry, &mut builder.budget, &source)?),
-        (None, None) => None,
-    };
+    let environment = scene.distant_light(&mut builder.budget, &source)?;
     builder.notes = source.notes.take();
     builder.lookup = source.lookup.take();
     for (mesh, file) in scene.mesh.iter().zip(mesh_files) {
@@ -204,6 +197,33 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     }
     loaded.settings = scene.render;
     Ok(loaded)
+}
+
+/// The environment or sky of the text of a scene file whose other parts are left out.
+pub(super) fn environment(
+    text: &str,
+    name: &Path,
+    budget: &mut Budget,
+) -> Result<Option<EnvironmentChange>, LoadError> {
+    parse(text, name)?.distant_light(budget, &Source::new(text, name))
+}
+
+impl SceneFile {
+    fn distant_light(
+        &self,
+        budget: &mut Budget,
+        source: &Source,
+    ) -> Result<Option<EnvironmentChange>, LoadError> {
+        Ok(match (&self.environment, &self.sky) {
+            (Some(_), Some(sky)) => {
+                let problem = "this scene file has a [sky] and an [environment]";
+                return Err(source.error(sky.span(), problem, "leave out one of them"));
+            }
+            (Some(entry), None) => Some(entry.resolved(source)?),
+            (None, Some(entry)) => Some(sky::environment(entry, budget, source)?),
+            (None, None) => None,
+        })
+    }
 }
 
 impl MeshEntry {

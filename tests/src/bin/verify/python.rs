@@ -12,8 +12,8 @@ const PACKAGE: &str = "std-app/bindings/python";
 /// Largest wheel in bytes.
 const MAX_WHEEL: u64 = 6 << 20;
 
-/// Packages of the environment: the builder, and those of the tests.
-const TOOLS: &str = "maturin>=1.9,<2 numpy pytest mypy nbclient ipykernel";
+/// Packages of the environment: the builder, and those of the tests and notebooks.
+const TOOLS: &str = "maturin>=1.9,<2 numpy pytest mypy nbclient ipykernel matplotlib pyradiance pyoidn";
 
 /// Builds the wheel and runs pytest. The package shares the folder of products with the root workspace.
 pub(crate) fn check(project: &Project) -> Outcome {

@@ -12,25 +12,12 @@ W/(m² sr), irradiance in W/m².
 
 from ._errors import Error, FileError, MemoryLimitError, SceneError, SettingsError
 from ._halflight import Progress, version
+from ._lightmap import Lightmap
+from ._lights import Directional, Environment, Point, Sky, Spot
+from ._materials import Material, Texture, coated, diffuse, glass, lamp, metal, mirror, pane, plastic
 from ._picture import Picture
 from ._points import Hits, Irradiance, read_points
-from ._scene import (
-    Camera,
-    Directional,
-    Material,
-    Mesh,
-    Point,
-    Scene,
-    Spot,
-    coated,
-    diffuse,
-    glass,
-    lamp,
-    metal,
-    mirror,
-    open,
-    pane,
-)
+from ._scene import Camera, Mesh, Scene, open
 from ._settings import settings
 from ._tools import Comparison, Eigen, Photons, compare, eigen, flip, read_image, save_image
 
@@ -41,10 +28,12 @@ __all__ = [
     "Comparison",
     "Directional",
     "Eigen",
+    "Environment",
     "Error",
     "FileError",
     "Hits",
     "Irradiance",
+    "Lightmap",
     "Material",
     "MemoryLimitError",
     "Mesh",
@@ -55,7 +44,9 @@ __all__ = [
     "Scene",
     "SceneError",
     "SettingsError",
+    "Sky",
     "Spot",
+    "Texture",
     "coated",
     "compare",
     "diffuse",
@@ -67,6 +58,7 @@ __all__ = [
     "mirror",
     "open",
     "pane",
+    "plastic",
     "read_image",
     "read_points",
     "save_image",

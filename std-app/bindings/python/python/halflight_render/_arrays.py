@@ -38,9 +38,28 @@ def picture(values: Any) -> NDArray[np.float32]:
     return array
 
 
+def pixels(values: ArrayLike, name: str, channels: int) -> NDArray[np.uint8] | NDArray[np.float32]:
+    """A picture (rows, columns, 3) or (rows, columns), in bytes or single precision, as (rows, columns, 1 or 3)."""
+    array = np.asarray(values)
+    if array.ndim == 2:
+        array = array[:, :, None]
+    if array.ndim != 3 or array.shape[2] not in (1, channels) or 0 in array.shape:
+        expected = "(rows, columns, 3) or (rows, columns)" if channels == 3 else "(rows, columns)"
+        hint = " (opacity is an argument of its own)" if array.ndim == 3 and array.shape[2] == 4 else ""
+        raise SettingsError(f"{name} has the shape {np.shape(values)}; {expected} is expected{hint}")
+    if array.dtype == np.uint8:
+        return np.ascontiguousarray(array)
+    if array.dtype.kind not in "fb":
+        raise SettingsError(f"{name} is of type {array.dtype}; uint8 or floats are expected")
+    return np.ascontiguousarray(array, np.float32)
+
+
 def triple(values: ArrayLike, name: str) -> tuple[float, float, float]:
     """Three finite numbers; a single number stands for three of it."""
-    array = np.asarray(values, np.float64)
+    try:
+        array = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise SettingsError(f"{name} is {values!r}; three finite numbers are expected") from None
     if array.ndim == 0:
         array = np.full(3, array)
     if array.shape != (3,) or not np.isfinite(array).all():

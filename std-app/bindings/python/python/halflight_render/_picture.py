@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _halflight
+from ._errors import SettingsError
 
 View = Literal["clamp", "neutral", "agx"]
 
@@ -22,6 +23,7 @@ class Picture:
     def __init__(self, rendered: _halflight.Rendered) -> None:
         self._rendered = rendered
         self._info: dict[str, Any] | None = None
+        self._layers: dict[str, NDArray[np.float32]] | None = None
 
     @property
     def image(self) -> NDArray[np.float32]:
@@ -37,6 +39,62 @@ class Picture:
     def samples(self) -> NDArray[np.uint32]:
         """Samples of each pixel, (rows, columns)."""
         return self._rendered.samples
+
+    @property
+    def layers(self) -> dict[str, NDArray[np.float32]]:
+        """Channels of the layers by name, as `albedo.R`, (rows, columns) each (docs/layers.md)."""
+        if self._layers is None:
+            self._layers = self._rendered.layers()
+        return self._layers
+
+    def _layer(self, name: str, channels: str, wanted: str | None = None) -> NDArray[np.float32]:
+        parts = [self.layers.get(f"{name}.{channel}") for channel in channels]
+        found = [part for part in parts if part is not None]
+        if len(found) < len(channels):
+            layer = wanted or name
+            wanted_layers = f"render with layers={[layer]}, and long enough for them"
+            raise SettingsError(f"the picture has no layer {layer!r}\n  help: {wanted_layers}", help=wanted_layers)
+        return np.stack(found, axis=-1) if len(found) > 1 else found[0]
+
+    @property
+    def albedo(self) -> NDArray[np.float32]:
+        """Light that the surface reflects, behind mirrors and glass, (rows, columns, 3)."""
+        return self._layer("albedo", "RGB")
+
+    @property
+    def normal(self) -> NDArray[np.float32]:
+        """Mean shading normal towards the viewer, behind mirrors and glass, (rows, columns, 3); 0 for the sky."""
+        return self._layer("normal", "XYZ")
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Distance of the first surface from the camera, (rows, columns); 0 for the sky."""
+        return self._layer("depth", "Z")
+
+    @property
+    def position(self) -> NDArray[np.float32]:
+        """Point of the first surface, (rows, columns, 3); 0 for the sky."""
+        return self._layer("position", "XYZ")
+
+    @property
+    def material(self) -> NDArray[np.int32]:
+        """Index into `Scene.materials` of the most frequent material of the pixel, -1 for the sky, (rows, columns)."""
+        return self._layer("material", "X").astype(np.int32)
+
+    @property
+    def object(self) -> NDArray[np.int32]:
+        """Index into `Scene.objects` of the most frequent object of the pixel, -1 for the sky, (rows, columns)."""
+        return self._layer("object", "X").astype(np.int32)
+
+    @property
+    def halves(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Means of the even and of the odd samples: two independent pictures, (rows, columns, 3) each."""
+        return self._layer("even", "RGB", "halves"), self._layer("odd", "RGB", "halves")
+
+    @property
+    def error(self) -> NDArray[np.float32]:
+        """Standard deviation of the noise of each channel of each pixel, (rows, columns, 3)."""
+        return np.sqrt(self.variance)
 
     @property
     def relmse(self) -> float | None:
@@ -93,7 +151,13 @@ class Picture:
         exposure: float | Literal["auto"] = 0.0,
         view: View = "clamp",
     ) -> None:
-        """Writes .png, .exr, .hdr or .pfm; stops of `exposure` and the curve `view` are for PNG alone."""
+        """Writes .png, .exr, .hdr or .pfm; stops of `exposure` and the curve `view` are for PNG alone.
+
+        An .exr has the layers, and the error, the settings and the seed as attributes.
+        """
+        if os.fspath(path).lower().endswith(".exr"):
+            self._rendered.save_exr(os.fspath(path))
+            return
         _halflight.write_image(os.fspath(path), self.image, stops(exposure), view)
 
     def png(self, *, exposure: float | Literal["auto"] = 0.0, view: View = "clamp") -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -12,7 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _halflight
 from ._arrays import indices, picture, rows64, triple
-from ._errors import SettingsError
+from ._errors import SceneError, SettingsError
+from ._lightmap import Lightmap
+from ._lights import Environment, Light, Sky, environment_parts, light_parts, named
+from ._materials import Material, Triple, parts
 from ._picture import Picture
 from ._points import Hits, Irradiance
 from ._progress import shown
@@ -20,96 +23,6 @@ from ._settings import Settings, words
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-Triple = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Material:
-    """A material; `diffuse`, `mirror`, `metal`, `coated`, `glass`, `pane` and `lamp` make them."""
-
-    kind: str = "diffuse"
-    #: Reflectance, or the tint of glass, 0 to 1 per channel.
-    color: Triple = (0.5, 0.5, 0.5)
-    #: Reflectance of a coat at normal incidence.
-    specular: Triple = (0.04, 0.04, 0.04)
-    #: Square root of GGX's alpha, 0 to 1.
-    roughness: float = 0.0
-    #: 0 is a coat over a base, 1 a metal.
-    metallic: float = 0.0
-    #: Index of refraction; None for a coat that does not change the light of its base.
-    ior: float | None = None
-    #: Radiance that the front emits, W/(m² sr).
-    emission: Triple = (0.0, 0.0, 0.0)
-    #: True if the back emits as well.
-    two_sided: bool = False
-    #: Probability that a ray hits the surface.
-    opacity: float = 1.0
-    #: Name in notes of the loader.
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        for name in ("color", "specular"):
-            if not all(0 <= channel <= 1 for channel in getattr(self, name)):
-                raise SettingsError(f"{name} is {getattr(self, name)}; channels are 0 to 1")
-        for name in ("roughness", "metallic", "opacity"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise SettingsError(f"{name} is {getattr(self, name)}; a number from 0 to 1 is expected")
-        if not all(0 <= channel <= 1e30 for channel in self.emission):
-            raise SettingsError(f"emission is {self.emission}; radiance is 0 or above")
-        least = 1.0 if self.kind == "pane" else 0.001
-        if self.ior is not None and not least <= self.ior <= 100:
-            raise SettingsError(f"ior is {self.ior}; an index of refraction is {least} to 100")
-
-    def emitting(self, radiance: ArrayLike, *, two_sided: bool = False) -> Material:
-        """The material with this emission."""
-        return replace(self, emission=triple(radiance, "radiance"), two_sided=two_sided)
-
-
-def diffuse(reflectance: ArrayLike) -> Material:
-    """A Lambertian surface."""
-    return Material("diffuse", triple(reflectance, "reflectance"))
-
-
-def mirror(reflectance: ArrayLike = 1.0) -> Material:
-    """A perfect mirror."""
-    return Material("mirror", triple(reflectance, "reflectance"))
-
-
-def metal(reflectance: ArrayLike, roughness: float = 0.0) -> Material:
-    """A GGX metal with this reflectance at normal incidence."""
-    return Material("metal", triple(reflectance, "reflectance"), roughness=roughness)
-
-
-def coated(
-    base: ArrayLike,
-    roughness: float = 0.0,
-    *,
-    specular: ArrayLike = 0.04,
-    ior: float | None = None,
-    metallic: float = 0.0,
-) -> Material:
-    """A diffuse base below a specular coat, as plastic and varnish are."""
-    color = triple(base, "base")
-    return Material(
-        "coated", color, triple(specular, "specular"), roughness=roughness, metallic=metallic, ior=ior
-    )
-
-
-def glass(ior: float = 1.5, roughness: float = 0.0, *, tint: ArrayLike = 1.0) -> Material:
-    """The boundary of a solid of glass or water."""
-    return Material("glass", triple(tint, "tint"), roughness=roughness, ior=ior)
-
-
-def pane(ior: float = 1.5, *, tint: ArrayLike = 1.0) -> Material:
-    """A thin pane: two faces as one surface."""
-    return Material("pane", triple(tint, "tint"), ior=ior)
-
-
-def lamp(radiance: ArrayLike, *, two_sided: bool = False) -> Material:
-    """A black surface that emits this radiance from its front."""
-    return diffuse(0.0).emitting(radiance, two_sided=two_sided)
-
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -126,77 +39,6 @@ class Mesh:
     texcoords: ArrayLike | None = None
     #: Name in notes and errors.
     name: str = ""
-
-
-@dataclass(frozen=True)
-class Point:
-    """A light at a point, with its radiant intensity in W/sr."""
-
-    position: ArrayLike
-    intensity: ArrayLike
-
-
-@dataclass(frozen=True)
-class Spot:
-    """A light at a point into a cone; angles are half-angles in degrees."""
-
-    position: ArrayLike
-    look_at: ArrayLike
-    #: Radiant intensity on the axis, W/sr.
-    intensity: ArrayLike
-    #: Angle from which there is no light.
-    angle: float = 45.0
-    #: Angle up to which the intensity is full.
-    inner_angle: float = 0.0
-
-
-@dataclass(frozen=True)
-class Directional:
-    """Parallel light from infinity."""
-
-    #: Direction in which the light travels, of any length.
-    direction: ArrayLike
-    #: Irradiance on a surface that faces it, W/m².
-    irradiance: ArrayLike
-
-
-Light = Point | Spot | Directional
-
-
-@dataclass(frozen=True)
-class _Light:
-    """A light in the layout of the library."""
-
-    kind: str
-    position: Triple
-    direction: Triple
-    color: Triple
-    angles: tuple[float, float] = (0.0, 0.0)
-
-
-def _unit(vector: ArrayLike, name: str) -> Triple:
-    x, y, z = triple(vector, name)
-    length = float(np.sqrt(x * x + y * y + z * z))
-    if not 0 < length < np.inf:
-        raise SettingsError(f"{name} has no direction")
-    return x / length, y / length, z / length
-
-
-def _light(light: Light) -> _Light:
-    zero = (0.0, 0.0, 0.0)
-    if isinstance(light, Point):
-        return _Light("point", triple(light.position, "position"), zero, triple(light.intensity, "intensity"))
-    if isinstance(light, Spot):
-        if not (0 <= light.inner_angle <= light.angle and 0.05 <= light.angle <= 180):
-            raise SettingsError("angles of a spot are 0 <= inner_angle <= angle, and angle 0.05 to 180 degrees")
-        position = triple(light.position, "position")
-        along = np.subtract(triple(light.look_at, "look_at"), position)
-        intensity = triple(light.intensity, "intensity")
-        return _Light(
-            "spot", position, _unit(along, "look_at - position"), intensity, (light.inner_angle, light.angle)
-        )
-    direction = _unit(light.direction, "direction")
-    return _Light("directional", zero, direction, triple(light.irradiance, "irradiance"))
 
 
 @dataclass(frozen=True)
@@ -229,16 +71,17 @@ class Scene:
         meshes: Sequence[Mesh],
         lights: Sequence[Light] = (),
         *,
-        environment: ArrayLike | None = None,
+        environment: ArrayLike | Environment | Sky | None = None,
         camera: Camera | None = None,
         memory: int | None = None,
     ) -> None:
         """Makes a scene from arrays, with the repairs of the loader (`notes`).
 
-        `environment` is the radiance of rays that leave the scene; `memory` limits bytes.
+        `environment` is the radiance of rays that leave the scene: a number or three, a picture, or a `Sky`. `memory`
+        limits bytes.
         """
         materials: dict[Material, int] = {}
-        parts = []
+        given = []
         for number, mesh in enumerate(meshes):
             material = materials.setdefault(mesh.material, len(materials))
             name = mesh.name or f"mesh {number}"
@@ -247,12 +90,9 @@ class Scene:
             coords = None if texcoords is None else rows64(texcoords, f"texcoords of {name}", 2)
             positions = rows64(mesh.positions, f"positions of {name}")
             triangles = indices(mesh.triangles, f"triangles of {name}")
-            parts.append((name, positions, normals, coords, triangles, material))
-        named = [
-            replace(material, name=material.name or f"material {number}")
-            for material, number in materials.items()
-        ]
-        _distinct([material.name for material in named])
+            given.append((name, positions, normals, coords, triangles, material))
+        textures, surfaces = parts(materials)
+        _distinct([surface.name for surface in surfaces])
         view = None
         if camera is not None:
             if camera.eye is None or camera.look_at is None:
@@ -262,15 +102,20 @@ class Scene:
             if not 0 < fov < 178:
                 raise SettingsError("a field of view is more than 0 and less than 178 degrees")
             view = (triple(camera.eye, "eye"), triple(camera.look_at, "look_at"), up, fov)
-        sky = None if environment is None else triple(environment, "environment")
-        converted = [_light(light) for light in lights]
-        self._renderer = _halflight.build(parts, named, converted, sky, view, memory)
+        afar = environment_parts(environment)
+        converted = [light_parts(light) for light in lights]
+        try:
+            self._renderer = _halflight.build(given, (textures, surfaces), converted, afar, view, memory)
+        except SceneError as error:
+            raise named(error, environment) from None
+        self._has_charts = True
         self._camera = None if camera is None or camera.lens is None else Camera(lens=camera.lens)
 
     @classmethod
-    def _opened(cls, path: str, memory: int | None) -> Scene:
+    def _opened(cls, path: str, memory: int | None, charts: bool) -> Scene:
         scene = cls.__new__(cls)
-        scene._renderer = _halflight.open(path, memory)
+        scene._renderer = _halflight.open(path, memory, charts)
+        scene._has_charts = charts
         scene._camera = None
         return scene
 
@@ -283,6 +128,16 @@ class Scene:
     def positions(self) -> NDArray[np.float64]:
         """Vertex positions, (n, 3)."""
         return self._renderer.positions
+
+    @property
+    def texcoords(self) -> NDArray[np.float32]:
+        """Texture coordinates of the vertices, (n, 2); (0, 2) if nothing uses them."""
+        return self._renderer.texcoords
+
+    @property
+    def objects(self) -> list[str]:
+        """Names of the objects, to which `Picture.object` refers."""
+        return self._renderer.object_names
 
     @property
     def triangles(self) -> NDArray[np.uint32]:
@@ -326,6 +181,8 @@ class Scene:
         with shown(settings.get("progress")) as callback:
             rendered, ended = _halflight.render(self._renderer, flags, compared, callback)
         made = Picture(rendered)
+        if (folder := settings.get("report")) is not None:
+            made.report(folder)
         if ended is not None:
             if isinstance(ended, KeyboardInterrupt):
                 ended.picture = made  # type: ignore[attr-defined]
@@ -346,6 +203,7 @@ class Scene:
         max_depth: int | None = None,
         threads: int | None = None,
         back_faces: bool = False,
+        method: PointMethod = "path",
         progress: Callable[[_halflight.Progress], object] | bool | None = None,
     ) -> Irradiance:
         """Irradiance of points, (n, 3), on the side of their normals, (n, 3), or one normal for all.
@@ -357,20 +215,18 @@ class Scene:
         directions = np.asarray(normals, np.float64)
         if directions.ndim == 1:
             directions = np.broadcast_to(directions, places.shape)
-        for name, value in (("spp", spp), ("seconds", seconds), ("error", error), ("threads", threads)):
-            if value is not None and not value > 0:
-                raise SettingsError(f"{name}={value}: a number above 0 is expected")
-        keywords = {
-            "spp": spp,
-            "seconds": seconds,
-            "error": error,
-            "light": light,
-            "caustics": caustics,
-            "seed": seed,
-            "max_depth": max_depth,
-            "threads": threads,
-            "back_faces": back_faces,
-        }
+        keywords = _positive(
+            spp=spp,
+            seconds=seconds,
+            error=error,
+            light=light,
+            caustics=caustics,
+            seed=seed,
+            max_depth=max_depth,
+            threads=threads,
+            back_faces=back_faces,
+            method=method,
+        )
         with shown(progress) as callback:
             baked, ended = _halflight.irradiance(
                 self._renderer, places, rows64(directions, "normals"), keywords, callback
@@ -390,6 +246,59 @@ class Scene:
         if ended is not None:
             if isinstance(ended, KeyboardInterrupt):
                 ended.irradiance = found  # type: ignore[attr-defined]
+            raise ended
+        return found
+
+    def bake_lightmap(
+        self,
+        size: tuple[int, int],
+        subject: str | None = None,
+        *,
+        spp: int | None = None,
+        seconds: float | None = None,
+        error: float | None = None,
+        supersample: int = 1,
+        pad: int = 4,
+        directional: bool = False,
+        light: Literal["all", "direct", "indirect"] = "all",
+        caustics: bool = True,
+        seed: int = 0,
+        max_depth: int | None = None,
+        threads: int | None = None,
+        method: PointMethod = "path",
+        progress: Callable[[_halflight.Progress], object] | bool | None = None,
+    ) -> Lightmap:
+        """Irradiance of the texels of a map of `size` (columns, rows) over the texture coordinates.
+
+        `subject` is the name of a mesh, an object or a material; None is all. The end is that of `irradiance`. A scene
+        of a file is opened with `charts=True`.
+        """
+        if not self._has_charts:
+            raise SettingsError("texture coordinates of files are kept by `hl.open(path, charts=True)` alone")
+        columns, rows = size
+        for name, value in (("size", columns), ("size", rows), ("supersample", supersample)):
+            if not 1 <= value <= 1 << 16:
+                raise SettingsError(f"{name}={value}: a number from 1 to 65536 is expected")
+        keywords = _positive(
+            spp=spp,
+            seconds=seconds,
+            error=error,
+            light=light,
+            caustics=caustics,
+            seed=seed,
+            max_depth=max_depth,
+            threads=threads,
+            back_faces=True,
+            method=method,
+        )
+        with shown(progress) as callback:
+            baked, ended = _halflight.lightmap(
+                self._renderer, ((columns, rows), subject, supersample, pad, directional), keywords, callback
+            )
+        found = Lightmap(baked)
+        if ended is not None:
+            if isinstance(ended, KeyboardInterrupt):
+                ended.lightmap = found  # type: ignore[attr-defined]
             raise ended
         return found
 
@@ -413,6 +322,18 @@ class Scene:
         return f"<Scene of {len(self.triangles)} triangles>"
 
 
+PointMethod = Literal["path", "irradiance-cache", "auto"]
+
+
+def _positive(**keywords: object) -> dict[str, object]:
+    """The keywords of irradiance; numbers are above 0."""
+    for name in ("spp", "seconds", "error", "threads"):
+        value = keywords[name]
+        if isinstance(value, int | float) and not value > 0:
+            raise SettingsError(f"{name}={value}: a number above 0 is expected")
+    return keywords
+
+
 def _distinct(names: Sequence[str]) -> None:
     """Refuses materials that share a name."""
     twice = {name for name in names if names.count(name) > 1}
@@ -420,6 +341,9 @@ def _distinct(names: Sequence[str]) -> None:
         raise SettingsError(f"different materials have the name {min(twice)!r}")
 
 
-def open(path: str | os.PathLike[str], *, memory: int | None = None) -> Scene:
-    """Loads a scene file (.toml), a mesh (.obj) or glTF (.glb, .gltf), within `memory` bytes."""
-    return Scene._opened(os.fspath(path), memory)
+def open(path: str | os.PathLike[str], *, memory: int | None = None, charts: bool = False) -> Scene:
+    """Loads a scene file (.toml), a mesh (.obj) or glTF (.glb, .gltf), within `memory` bytes.
+
+    With `charts`, texture coordinates are those of the files, as `bake_lightmap` needs them.
+    """
+    return Scene._opened(os.fspath(path), memory, charts)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import numpy as np
@@ -38,6 +39,9 @@ class Settings(TypedDict, total=False):
     lens: float | tuple[float, float]
     reconstruct: bool | Literal["auto", "off"]
     reference: Any
+    # Layers beside the picture: names, or "all". The folder of a report with views of its photon maps.
+    layers: str | Sequence[str]
+    report: Path
     # Light transport.
     max_depth: int
     caustics: bool | Literal["auto", "off"]
@@ -76,7 +80,7 @@ class Settings(TypedDict, total=False):
 
 
 #: Keywords with another name than their flag.
-RENAMED = {"seconds": "time"}
+RENAMED = {"seconds": "time", "layers": "aov"}
 
 #: Keywords that are no flags.
 OWN = ("reference", "progress")
@@ -85,15 +89,20 @@ OWN = ("reference", "progress")
 SEPARATORS = {"size": "x"}
 
 
+@cache
+def _names() -> tuple[str, ...]:
+    names = {flag: name for name, flag in RENAMED.items()}
+    return (*(names.get(flag, flag) for flag in keywords()), *OWN)
+
+
 def settings() -> list[str]:
     """Names of all settings of a render."""
-    names = {flag: name for name, flag in RENAMED.items()}
-    return [names.get(flag, flag) for flag in keywords()] + list(OWN)
+    return list(_names())
 
 
 def words(given: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Keywords and values as flags and their text."""
-    known = settings()
+    known = _names()
     for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1, 0.5)

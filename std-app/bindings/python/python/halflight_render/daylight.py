@@ -6,19 +6,24 @@ Radiance's watts; `Irradiance.lux` has its 179 lm/W. Up is +z, as in Radiance.
 
 from __future__ import annotations
 
+import argparse
 import os
+import shlex
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._errors import SceneError
-from ._scene import Scene, Triple
+from ._errors import Error, SceneError, SettingsError
+from ._materials import Triple
+from ._points import Irradiance, read_points
+from ._scene import Scene
 from ._scene import open as open_scene
 from ._tools import save_image
 
@@ -74,7 +79,8 @@ def sky(text: bytes | str, *, rows: int = 256) -> Sky:
         red, green, blue = (float(channel * solid_angle) for channel in lights[suns[0].modifier])
         sun = (x / length, y / length, z / length), (red, green, blue)
     kept = b"\n".join(p.bytes for p in primitives if p not in suns and p.identifier not in lights)
-    dome = (
+    has_dome = any(p.ptype == "source" and p not in suns for p in primitives)
+    dome = b"" if has_dome else (
         b"\nskyfunc glow halflight_sky 0 0 4 1 1 1 0\nhalflight_sky source halflight_dome 0 0 4 0 0 1 180\n"
         b"halflight_sky source halflight_ground 0 0 4 0 0 -1 180\n"
     )
@@ -115,7 +121,62 @@ def scene(
     Polygons, spheres, cylinders, cones and rings of the materials plastic, metal, mirror, glass, dielectric, light,
     glow and illum are accepted; patterns, textures and mixtures are refused.
     """
-    primitives = [p for file in files for p in _primitives(Path(file))]
+    return _built([p for file in files for p in _primitives(Path(file))], sky, memory)
+
+
+def point_in_time(
+    octree: str | os.PathLike[str],
+    grid: str | os.PathLike[str],
+    *,
+    metric: Literal["illuminance", "irradiance"] = "illuminance",
+    output: str | os.PathLike[str] | None = None,
+    **keywords: Any,
+) -> tuple[NDArray[np.float64], Irradiance]:
+    """The command `honeybee-radiance raytrace point-in-time` with halflight in the place of rtrace.
+
+    `octree` names the files of its scene and of its sky, relative to its folder; the lines of `grid` are
+    `x y z nx ny nz`. Returns the numbers that rcalc makes of rtrace's colours, and the irradiances with their
+    intervals. `output` is a .res file of those numbers; keywords are those of `Scene.irradiance`.
+    """
+    if metric not in ("illuminance", "irradiance"):
+        raise SettingsError(f"metric={metric!r}: expected one of illuminance, irradiance")
+    room = of_octree(octree)
+    found = room.irradiance(*read_points(grid), **keywords)
+    values: NDArray[np.float64] = found.rgb.astype(np.float64) @ HONEYBEE
+    if metric == "illuminance":
+        values *= 179.0
+    if output is not None:
+        np.savetxt(output, values, "%.7g")
+    return values, found
+
+
+#: Weights of red, green and blue by which Honeybee makes a number of a colour.
+HONEYBEE = np.array([0.265, 0.67, 0.065])
+
+
+def of_octree(octree: str | os.PathLike[str], *, memory: int | None = None) -> Scene:
+    """The scene of the files that an octree names, with its sky."""
+    file = Path(octree)
+    program = Path(str(_pyradiance().BINPATH)) / "getinfo"
+    header = subprocess.run([program, file], capture_output=True, check=False).stdout.decode(errors="replace")
+    commands = [shlex.split(line) for line in header.splitlines() if line.strip().startswith("oconv ")]
+    words = [word for command in commands for word in command if (file.parent / word).is_file()]
+    if not words:
+        raise SceneError(f"{file}: no octree, or one whose files are not in its folder", str(file))
+    primitives = [p for word in words for p in _primitives(file.parent, word)]
+    sources = [p for p in primitives if p.ptype == "source"]
+    of_sky = {p.modifier for p in sources}
+    # Modifiers of modifiers, as `skyfunc` of `sky_glow`.
+    for p in reversed(primitives):
+        if p.identifier in of_sky and p.ptype not in _SHAPES:
+            of_sky.add(p.modifier)
+    used = {p.modifier for p in primitives if p.ptype in _SHAPES}
+    described = [p for p in primitives if p in sources or (p.identifier in of_sky and p.identifier not in used)]
+    light = sky(b"\n".join(p.bytes for p in described)) if sources else None
+    return _built([p for p in primitives if p not in described], light, memory)
+
+
+def _built(primitives: Sequence[Any], sky: Sky | None, memory: int | None) -> Scene:
     text: list[str] = []
     materials: dict[str, dict[str, Any]] = {}
     for primitive in primitives:
@@ -152,12 +213,13 @@ def _value(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value)
 
 
-def _primitives(file: Path) -> list[Any]:
-    """Primitives of a file with the output of its commands."""
+def _primitives(file: Path, name: str | None = None) -> list[Any]:
+    """Primitives of a file, or of `name` in a folder, with the output of its commands."""
     radiance = _pyradiance()
     program = Path(str(radiance.BINPATH)) / "xform"
     # Commands name files relative to the folder of theirs.
-    done = subprocess.run([program, "-e", file.name], cwd=file.parent, capture_output=True, check=False)
+    folder, name = (file.parent, file.name) if name is None else (file, name)
+    done = subprocess.run([program, "-e", name], cwd=folder, capture_output=True, check=False)
     # A command that fails is a message alone.
     if done.returncode or done.stderr:
         problem = done.stderr.decode(errors="replace").strip()
@@ -245,3 +307,27 @@ def _sphere(numbers: Sequence[float]) -> list[Polygon]:
 
 
 _SHAPES = {"polygon": _polygon, "cone": _cone, "cylinder": _cone, "ring": _ring, "sphere": _sphere}
+
+
+def main() -> None:
+    """The command: octree, grid, and the file of the numbers."""
+    parser = argparse.ArgumentParser(prog="python -m halflight_render.daylight", description=point_in_time.__doc__)
+    parser.add_argument("octree")
+    parser.add_argument("grid")
+    parser.add_argument("--metric", choices=("illuminance", "irradiance"), default="illuminance")
+    parser.add_argument("--output", required=True)
+    parser.add_argument("--error", type=float, help="half-width of the intervals, relative")
+    parser.add_argument("--spp", type=int, help="samples of each sensor")
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--threads", type=int)
+    parser.add_argument("--method", choices=("path", "irradiance-cache", "auto"), default="path")
+    try:
+        _, found = point_in_time(**vars(parser.parse_args()))
+    except Error as error:
+        sys.exit(f"error: {error}")
+    half = (found.upper - found.value) / np.maximum(found.value, 1e-9)
+    print(f"{len(found)} sensors, median half-width of the intervals {np.median(half):.1%}, {found.seconds:.2g} s")
+
+
+if __name__ == "__main__":
+    main()

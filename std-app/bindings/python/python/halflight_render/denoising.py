@@ -2,8 +2,8 @@
 
 Two pictures A and B of the same view with different seeds are independent, and B has a known variance. The denoised
 A, D(A), depends on A alone, so that the mean of (D(A) - B)² - Var(B) is an unbiased estimate of the squared error of
-D(A): no reference is needed. The picture that is returned is denoised from both, which is better than D(A) and D(B);
-their mean error is an upper estimate.
+D(A): no reference is needed. The picture that is returned is denoised from both. Its error follows from those of D(A)
+and of denoised halves of A, whose ratio is taken to stay the same from step to step.
 """
 
 from __future__ import annotations
@@ -30,8 +30,12 @@ class Denoised:
 
     #: The denoised mean of both pictures, (rows, columns, 3).
     image: Pixels
-    #: Upper estimate of its relMSE.
+    #: Estimate of its relMSE; equal to `upper` for pictures without halves.
     relmse: float
+    #: Upper estimate of its relMSE: that of one denoised picture of the two.
+    upper: float
+    #: Standard error of `upper`.
+    standard_error: float
     #: relMSE of the mean of both pictures, which is not denoised.
     noisy_relmse: float
     #: relMSE of a single denoised picture by blocks of 16 × 16 pixels, and its standard error.
@@ -39,6 +43,12 @@ class Denoised:
     block_errors: NDArray[np.float64]
     #: relMSE of a single noisy picture by blocks.
     noisy_blocks: NDArray[np.float64]
+    #: The filter.
+    denoiser: Callable[[Pixels], Pixels]
+
+    def of(self, picture: Picture) -> Pixels:
+        """Another picture of the view, denoised in the same way."""
+        return self.denoiser(picture.image)
 
     @property
     def worse(self) -> NDArray[np.bool_]:
@@ -47,50 +57,101 @@ class Denoised:
         return found
 
 
-def oidn(image: Pixels) -> Pixels:
-    """The picture denoised by Open Image Denoise."""
+def oidn(image: Pixels, albedo: Pixels | None = None, normal: Pixels | None = None) -> Pixels:
+    """The picture denoised by Open Image Denoise, with layers if there are some."""
     try:
         import pyoidn
     except ImportError as error:
         raise ImportError("denoising needs pyoidn: pip install halflight-render[denoise]") from error
-    denoised: Pixels = np.asarray(pyoidn.denoise(np.ascontiguousarray(image), hdr=True), np.float32)
+    layers = () if albedo is None else (albedo,) if normal is None else (albedo, normal)
+    denoised: Pixels = np.asarray(pyoidn.denoise(np.ascontiguousarray(image), *layers, hdr=True), np.float32)
     return denoised
 
 
 def denoise(
-    first: Picture, second: Picture, *, denoiser: Callable[[Pixels], Pixels] = oidn
+    first: Picture, second: Picture | None = None, *, denoiser: Callable[[Pixels], Pixels] | None = None
 ) -> Denoised:
-    """Denoises two renders of one view with different seeds and `reconstruct=False`.
+    """Denoises two renders of one view with different seeds and `reconstruct=False`, or the halves of one.
 
-    `denoiser` maps a picture to a better one, and need not be a neural network.
+    Pictures with `layers=["halves"]` have a better estimate of the error. Open Image Denoise is the default, with the
+    layers albedo and normal if the pictures have them. Another `denoiser` maps a picture to a better one, and need not
+    be a neural network.
     """
-    for picture in (first, second):
+    pictures = [first] if second is None else [first, second]
+    for picture in pictures:
         if picture.spp < 4:
             raise SettingsError(f"the error of a denoised picture needs 4 samples per pixel, not {picture.spp}")
         if picture.findings.get("reconstruction", {}).get("decision") == "used":
             raise SettingsError("a reconstructed picture is denoised already: render with reconstruct=False")
-    if first.image.shape != second.image.shape:
-        raise SettingsError("the pictures differ in size")
-    if np.array_equal(first.image, second.image):
-        raise SettingsError("the pictures are the same: render them with different seeds")
-    a, b = (picture.image.astype(np.float64) for picture in (first, second))
-    mean = np.asarray((a + b) / 2, np.float32)
-    both = denoiser(mean).astype(np.float64)
-    # A denoiser that spreads a lamp over its surroundings must not lower the weight of their error.
-    weight = 1 / (np.minimum(np.abs(both), np.abs(mean)) ** 2 + 0.01 * both.mean() ** 2)
-    of_a = denoiser(first.image).astype(np.float64)
-    of_b = denoiser(second.image).astype(np.float64)
-    errors = ((of_a - b) ** 2 - second.variance + (of_b - a) ** 2 - first.variance) * weight / 2
-    noisy = (first.variance + second.variance) * weight / 2
+    quarters: list[Pixels] = []
+    if second is None:
+        a, b = (half.astype(np.float64) for half in first.halves)
+        variance_a = variance_b = (a - b) ** 2 / 2
+    else:
+        if first.image.shape != second.image.shape:
+            raise SettingsError("the pictures differ in size")
+        if np.array_equal(first.image, second.image):
+            raise SettingsError("the pictures are the same: render them with different seeds")
+        a, b = (picture.image.astype(np.float64) for picture in pictures)
+        variance_a, variance_b = (picture.variance.astype(np.float64) for picture in pictures)
+        if all("even.R" in picture.layers for picture in pictures):
+            quarters = [*first.halves, *second.halves]
+    apply = denoiser or _with_layers(first)
+    mean = (a + b) / 2
+    both = _applied(apply, mean)
+    # A denoiser that brightens a place, or spreads a lamp, must not lower the weight of its error there. Samples that
+    # find no light must not raise it.
+    seen = np.maximum(np.abs(mean), _medians(mean))
+    weight = 1 / (np.minimum(np.abs(both), seen) ** 2 + 0.01 * mean.mean() ** 2)
+
+    def error(denoised: NDArray[np.float64], other: NDArray[np.float64], variance: NDArray[np.float64]) -> Any:
+        return ((denoised - other) ** 2 - variance) * weight
+
+    errors = (error(_applied(apply, a), b, variance_b) + error(_applied(apply, b), a, variance_a)) / 2
+    noisy = (variance_a + variance_b) * weight / 2
     blocks, deviations = _blocks(errors.mean(axis=2))
+    upper = relmse = float(errors.mean())
+    if quarters:
+        others = ((b, variance_b), (b, variance_b), (a, variance_a), (a, variance_a))
+        pairs = zip(quarters, others, strict=True)
+        before = float(np.mean([error(_applied(apply, part), *other) for part, other in pairs]))
+        relmse = upper * min(max(upper / max(before, 1e-30), 0.5), 1.0)
+    # A picture of both that is worse than those of each: its error correlates with its own noise, so that this is a
+    # lower estimate.
+    of_both = ((both - a) * (both - b) * weight).mean(axis=2)
+    least = float(of_both.mean() - 2 * of_both.std() / np.sqrt(of_both.size))
     return Denoised(
         image=both.astype(np.float32),
-        relmse=float(errors.mean()),
+        relmse=max(relmse, least),
+        upper=max(upper, least),
+        standard_error=float(errors.mean(axis=2).std() / np.sqrt(of_both.size)),
         noisy_relmse=float(noisy.mean() / 2),
         blocks=blocks,
         block_errors=deviations,
         noisy_blocks=_blocks(noisy.mean(axis=2))[0],
+        denoiser=apply,
     )
+
+
+def _with_layers(picture: Picture) -> Callable[[Pixels], Pixels]:
+    """Open Image Denoise with the layers of a picture."""
+    if "albedo.R" not in picture.layers:
+        return oidn
+    albedo = np.clip(picture.albedo, 0, 1)
+    normal = picture.normal if "normal.X" in picture.layers else None
+    return lambda image: oidn(image, albedo, normal)
+
+
+def _applied(denoiser: Callable[[Pixels], Pixels], image: NDArray[Any]) -> NDArray[np.float64]:
+    return np.asarray(denoiser(np.asarray(image, np.float32)), np.float64)
+
+
+def _medians(image: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Medians of 3 × 3 pixels."""
+    padded = np.pad(image, ((1, 1), (1, 1), (0, 0)), "edge").astype(np.float32)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), (0, 1))
+    channels = [np.median(windows[:, :, channel], axis=(-1, -2)) for channel in range(image.shape[2])]
+    return np.stack(channels, axis=2).astype(np.float64)
 
 
 def _blocks(pixels: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
