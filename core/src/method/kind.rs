@@ -203,8 +203,8 @@ impl MethodKind {
         self.properties().shares
     }
 
-    /// True if neighbouring pixels have errors in common that more samples do not reduce: those of records and
-    /// of photons for several samples. Such pixels would judge each other too well in a reconstruction.
+    /// True if records or photons serve several samples: then neighbouring pixels have errors in common, and
+    /// judge each other too well in a reconstruction.
     pub const fn has_common_errors(self) -> bool {
         self.properties().has_common_errors
     }
