@@ -118,7 +118,7 @@ fn a_merged_picture_knows_what_its_samples_share() {
     let cases = [
         (caustic.to_str().unwrap(), "path", false, "noise and blur of photons"),
         ("scene.obj", "path", false, "noise and bias of the reconstruction"),
-        ("scene.obj", "sppm", true, "noise alone; bias is not included"),
+        ("scene.obj", "sppm", true, "noise and bias of the reconstruction; other bias is not included"),
     ];
     for (scene, method, biased, words) in cases {
         let render = render(scene, method);

@@ -21,6 +21,28 @@ fn a_picture_is_reconstructed_unless_the_command_says_otherwise() {
 }
 
 #[test]
+fn pictures_with_light_paths_are_reconstructed_and_those_with_records_are_not() {
+    let folder = Folder::new("reconstructed");
+    let render = "render scene.obj --size 64x64 --audit off --json";
+    folder.object(&format!("{render} --spp 128 --seed 9 --method path --reconstruct off -o reference.pfm"));
+    for method in ["light", "sppm"] {
+        let render = format!("{render} --spp 16 --method {method}");
+        let made = folder.object(&format!("{render} -o made.pfm"));
+        assert_eq!(made["findings"]["reconstruction"]["decision"], "used", "{method}");
+        folder.object(&format!("{render} -o raw.pfm --reconstruct off"));
+        let [made, raw] = ["made", "raw"].map(|name| {
+            let compared = folder.object(&format!("compare {name}.pfm reference.pfm --json"));
+            compared["relmse"].as_f64().unwrap()
+        });
+        assert!(made < 0.8 * raw, "{method}: {made} {raw}");
+    }
+    let cached = folder.object(&format!("{render} --spp 16 --method irradiance-cache -o cached.pfm"));
+    let finding = &cached["findings"]["reconstruction"];
+    assert_eq!(finding["decision"], "left out");
+    assert!(finding["reason"].as_str().unwrap().contains("records"));
+}
+
+#[test]
 fn too_little_memory_or_too_few_samples_leave_the_picture_as_it_is() {
     let folder = Folder::new("raw");
     let bytes = |name: &str| std::fs::read(folder.path(name)).unwrap();

@@ -7,7 +7,7 @@ use crate::estimate::{BiasEstimate, ErrorEstimate};
 use crate::film::Film;
 use crate::method::hidden_light::{HiddenLight, LackingLight};
 use crate::method::{Executor, RenderState};
-use crate::reconstruction::{FilmReconstruction, NotReconstructed, ReconstructionError};
+use crate::reconstruction::{FilmReconstruction, ReconstructionError};
 
 /// Error of a picture in its parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,10 +56,7 @@ impl ErrorReport {
         let mean = film.mean_radiance(executor);
         let noise = mean.and_then(|mean| ErrorEstimate::of_film(film, mean, state.is_correlated, executor));
         let reconstruction = reconstruction.map(|made| {
-            match state.is_correlated {
-                true => made.leave(NotReconstructed::Correlated),
-                false => made.update(film, noise, executor),
-            }
+            made.update(film, noise, executor);
             &*made
         });
         let Some(mean) = mean else { return Self::default() };

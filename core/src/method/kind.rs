@@ -36,6 +36,8 @@ struct Properties {
     converges: bool,
     finds_caustics: bool,
     shares: bool,
+    /// True if records or photons serve many samples.
+    has_common_errors: bool,
     /// True if paths without light paths of their own may be joined with caustic photons.
     may_join_caustics: bool,
 }
@@ -49,6 +51,7 @@ const UNBIASED: Properties = Properties {
     converges: true,
     finds_caustics: false,
     shares: true,
+    has_common_errors: false,
     may_join_caustics: false,
 };
 
@@ -69,6 +72,7 @@ const TABLE: &[Properties] = &[
         is_biased: true,
         converges: false,
         may_join_caustics: true,
+        has_common_errors: true,
         ..UNBIASED
     },
     Properties {
@@ -78,6 +82,7 @@ const TABLE: &[Properties] = &[
         is_biased: true,
         converges: false,
         may_join_caustics: true,
+        has_common_errors: true,
         ..UNBIASED
     },
     Properties {
@@ -88,6 +93,7 @@ const TABLE: &[Properties] = &[
         is_biased: true,
         converges: false,
         finds_caustics: true,
+        has_common_errors: true,
         ..UNBIASED
     },
     Properties {
@@ -195,6 +201,12 @@ impl MethodKind {
     /// between even and odd samples, but not between tiles.
     pub const fn shares(self) -> bool {
         self.properties().shares
+    }
+
+    /// True if records or photons serve several samples: then neighbouring pixels have errors in common, and
+    /// judge each other too well in a reconstruction.
+    pub const fn has_common_errors(self) -> bool {
+        self.properties().has_common_errors
     }
 
     /// True if the method has caches of records, which files keep.

@@ -28,7 +28,7 @@ pub const LEAST_SAMPLES: u32 = 2 * FEWEST;
 /// Why a film is not reconstructed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotReconstructed {
-    /// Distant pixels share data.
+    /// Neighbouring pixels have errors in common.
     Correlated,
     /// A half of a pixel has fewer than two samples.
     FewSamples,
@@ -127,13 +127,16 @@ impl<'m> FilmReconstruction<'m> {
         Ok(Self { surfaces, values, groups, memory, size, unit: 1.0, parts: [0.5; 2], result })
     }
 
-    /// Leaves the picture as it is.
-    pub fn leave(&mut self, reason: NotReconstructed) {
-        self.result = Err(reason);
+    /// Leaves the pictures of this film as they are, since its neighbouring pixels have errors in common.
+    pub fn leave(&mut self) {
+        self.result = Err(NotReconstructed::Correlated);
     }
 
     /// Reconstructs `film`, whose own error is `raw`, if that makes the error smaller.
     pub fn update(&mut self, film: &Film, raw: Option<ErrorEstimate>, executor: &mut impl Executor) {
+        if self.result == Err(NotReconstructed::Correlated) {
+            return;
+        }
         let gains = |result: &Reconstructed| raw.is_none_or(|raw| result.error.total.relmse < raw.relmse);
         self.result = self.reconstruct(film, executor).and_then(|result| match gains(&result) {
             true => Ok(result),

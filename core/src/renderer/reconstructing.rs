@@ -7,10 +7,10 @@ use crate::method::{Executor, MethodKind, RenderContext, Shard};
 use crate::reconstruction::{FilmReconstruction, FirstSurfaces};
 use crate::scene::Scene;
 
-/// True if pictures are to be reconstructed: of methods that share nothing between pixels, and whole ones.
+/// True if pictures are to be reconstructed: whole ones, by methods whose pixels can judge each other.
 fn is_wanted(settings: &Settings) -> bool {
-    let shares = settings.method.kind().is_some_and(MethodKind::shares);
-    settings.reconstruct == Reconstruct::Auto && !shares && settings.shard == Shard::WHOLE
+    let is_common = settings.method.kind().is_some_and(MethodKind::has_common_errors);
+    settings.reconstruct == Reconstruct::Auto && !is_common && settings.shard == Shard::WHOLE
 }
 
 /// Memory that stays taken, and memory for the search of surfaces before other structures are made.

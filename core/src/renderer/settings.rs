@@ -39,7 +39,7 @@ pub struct Settings {
     /// Fraction of the work, from 0 to below 1, for an audit: path tracing of some pixels, which measures the
     /// bias. `None`: 0.05 if the method is biased, or more where the audit alone delays an error target.
     pub audit: Option<f64>,
-    /// Reconstruction of a picture by paths, and its error, from the halves of its film.
+    /// Reconstruction of the picture, and its error, from the halves of its film.
     pub reconstruct: Reconstruct,
 }
 

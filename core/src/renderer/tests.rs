@@ -134,9 +134,11 @@ fn a_fraction_of_all_work_and_one_that_is_no_number_are_errors() {
 fn a_reconstructed_picture_tells_its_error_and_keeps_its_film() {
     let paths = settings(Method::Path(PathOptions::PLAIN));
     let lights = VirtualLightSettings { light_paths: Some(1024), connections: None };
-    let biased = settings(Method::ClampedInstantRadiosity(lights));
+    let lights = settings(Method::InstantRadiosity(lights));
+    let photons = PhotonSettings { global: Some(2048), ..PhotonSettings::DEFAULT };
+    let photons = settings(Method::PhotonMap(photons));
     with_corner(|scene| {
-        for (plain, shares) in [(paths, false), (biased, true)] {
+        for (plain, has_common_errors) in [(paths, false), (lights, false), (photons, true)] {
             let film = render(scene, &plain, 0, |renderer, executor| {
                 let mut renderer = renderer.unwrap();
                 renderer.step(executor, Until::Samples(16)).unwrap();
@@ -151,7 +153,7 @@ fn a_reconstructed_picture_tells_its_error_and_keeps_its_film() {
                 renderer.step(executor, Until::Samples(16)).unwrap();
                 assert!(renderer.film().pixels() == film);
                 let report = renderer.error_report();
-                if shares {
+                if has_common_errors {
                     assert!(report.reconstructed.is_none() && renderer.picture().eq(renderer.film().rows()));
                     return;
                 }

@@ -27,7 +27,7 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
         return Ok((None, None));
     }
     let without = |reason| Ok((None, Some(Finding::new(TOPIC, LeftOut, reason))));
-    if method.shares() {
+    if method.has_common_errors() {
         return without(NotReconstructed::Correlated.reason());
     }
     let size = [settings.width, settings.height];

@@ -193,7 +193,7 @@ typedef struct {
     uint32_t max_depth;
     // True for the same bits on every processor.
     bool precise;
-    // True if a picture by paths is reconstructed from the halves of its film.
+    // True if the picture is reconstructed from the halves of its film.
     bool reconstruct;
     // Part of the picture: every `shards`th tile from tile `shard` on.
     uint32_t shard;

@@ -45,7 +45,7 @@ pub struct HalflightSettings {
     pub max_depth: u32,
     /// True for the same bits on every processor.
     pub precise: bool,
-    /// True if a picture by paths is reconstructed from the halves of its film.
+    /// True if the picture is reconstructed from the halves of its film.
     pub reconstruct: bool,
     /// Part of the picture: every `shards`th tile from tile `shard` on.
     pub shard: u32,
