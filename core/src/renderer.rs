@@ -3,6 +3,7 @@
 mod audited;
 mod build;
 mod error;
+mod light_probe;
 mod of_features;
 mod points;
 mod reconstructing;
@@ -14,6 +15,7 @@ pub use crate::reconstruction::ReconstructionError;
 #[doc(hidden)]
 pub use audited::OutOfReach;
 pub use error::RenderError;
+pub use light_probe::LightProbe;
 pub use of_features::FeatureRenderer;
 #[doc(hidden)]
 pub use points::PointFilm;
