@@ -118,6 +118,15 @@ export interface Irradiance {
     samples: Uint32Array;
 }
 
+export interface Probes {
+    /** Spherical harmonics of radiance, nine colours for each place, in the order of `SphericalHarmonics3` of three.js. */
+    coefficients: Float32Array;
+    /** Half-widths of the 95 % intervals of the luminance of each coefficient. */
+    halfWidths: Float32Array;
+    /** 1 for each place inside a body. */
+    inside: Uint8Array;
+}
+
 export function load(source?: string | URL | BufferSource | WebAssembly.Module): Promise<Halflight>;
 
 export class Halflight {
@@ -141,7 +150,10 @@ export class Points {
 
 export class Scene {
     renderer(settings: Settings): Renderer;
+    /** Irradiance at points of six numbers each: position and unit normal. */
     irradiance(points: Float32Array, settings?: IrradianceSettings): Irradiance;
+    /** Light probes at places x, y, z. */
+    probes(places: Float32Array, settings?: IrradianceSettings): Probes;
     free(): void;
 }
 
