@@ -106,6 +106,7 @@ assert.equal(toRgba(picture).length, 4 * 32 * 24);
 assert.equal(new DataView(toExr(picture, 32, 24).buffer).getUint32(0, true), 20000630);
 
 // Freed memory is used again.
+const texels = new Uint8Array(1 << 20);
 const before = halflight.exports.memory.buffer.byteLength;
 for (let i = 0; i < 200; i++) {
     const again = scene.renderer({ ...size, method: 'path' });
@@ -113,7 +114,7 @@ for (let i = 0; i < 200; i++) {
     again.picture();
     again.free();
     // A scene that is refused keeps nothing.
-    const textures = [{ width: 64, height: 64, srgb: new Uint8Array(16384) }];
+    const textures = [{ width: 512, height: 512, srgb: texels }];
     assert.throws(() => halflight.scene({ ...room, textures, materials: [{ colorTexture: 7 }] }));
 }
 assert.equal(halflight.exports.memory.buffer.byteLength, before);
