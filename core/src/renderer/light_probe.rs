@@ -5,8 +5,8 @@ use crate::Rgb;
 use core::f32::consts::{FRAC_PI_4, PI};
 use glam::Vec3;
 
-/// Light around a point: spherical harmonics of radiance to degree 2, in the order 1, y, z, x, xy, yz, 3z² - 1,
-/// xz, x² - y², as `SphericalHarmonics3` of three.js has them.
+/// Light around a point: spherical harmonics of radiance to degree 2, in the order 1, y, z, x, xy, yz,
+/// 3z² - 1, xz, x² - y², as `SphericalHarmonics3` of three.js has them.
 ///
 /// ```
 /// use halflight_core::glam::Vec3;

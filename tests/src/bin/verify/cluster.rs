@@ -157,9 +157,9 @@ PartitionName=all Nodes=ALL Default=YES
         ))?;
         until("munged", || Ok(folder.join("munge.socket").exists().then_some(())))?;
         slurm.daemon("/usr/sbin/slurmctld -D")?;
-        until("slurmctld", || Ok(slurm.tell("sinfo -h").is_ok().then_some(())))?;
+        until("slurmctld", || Ok(slurm.client("sinfo -h").is_ok().then_some(())))?;
         slurm.daemon("/usr/sbin/slurmd -D")?;
-        until("slurmd", || Ok(slurm.tell("sinfo -h -o %T")?.contains("idle").then_some(())))?;
+        until("slurmd", || Ok(slurm.client("sinfo -h -o %T")?.contains("idle").then_some(())))?;
         Ok(slurm)
     }
 
@@ -172,9 +172,9 @@ PartitionName=all Nodes=ALL Default=YES
     }
 
     /// Answer of a command of Slurm.
-    fn tell(&self, line: &str) -> Outcome {
-        let mut client = command(&self.cluster.folder, line);
-        output(client.env("SLURM_CONF", self.cluster.folder.join("slurm.conf")))
+    fn client(&self, line: &str) -> Outcome {
+        let mut request = command(&self.cluster.folder, line);
+        output(request.env("SLURM_CONF", self.cluster.folder.join("slurm.conf")))
     }
 
     /// Numbers of an array of four and of the job that merges it.
@@ -194,13 +194,13 @@ PartitionName=all Nodes=ALL Default=YES
     }
 
     fn job(&self, number: &str) -> Outcome {
-        self.tell(&format!("scontrol show job {number}"))
+        self.client(&format!("scontrol show job {number}"))
     }
 
     /// Requeues a running part that has a film, and returns its number.
     fn requeue(&self, array: &str) -> Outcome {
         let part = until("a part with a film", || {
-            let running = self.tell("squeue -h -t R -o %F_%K")?;
+            let running = self.client("squeue -h -t R -o %F_%K")?;
             let has_film = |part: &&str| {
                 let index = part.strip_prefix(&format!("{array}_"));
                 index.is_some_and(|index| {
@@ -209,7 +209,7 @@ PartitionName=all Nodes=ALL Default=YES
             };
             Ok(running.lines().find(has_film).map(str::to_owned))
         })?;
-        self.tell(&format!("scontrol requeue {part}"))?;
+        self.client(&format!("scontrol requeue {part}"))?;
         Ok(part)
     }
 
@@ -231,7 +231,7 @@ PartitionName=all Nodes=ALL Default=YES
 impl Drop for Slurm<'_> {
     fn drop(&mut self) {
         for name in ["halflight", "halflight-merge"] {
-            let _ = self.tell(&format!("scancel --name={name}"));
+            let _ = self.client(&format!("scancel --name={name}"));
         }
         for daemon in self.daemons.iter_mut().rev() {
             let _ = daemon.kill();
