@@ -38,7 +38,12 @@ export class Pool {
         const pool = new Pool();
         pool.workers = Array.from({ length: Math.max(1, count) }, () => new Remote());
         pool.judge = new Remote();
-        await Promise.all([...pool.workers, pool.judge].map((remote) => remote.call('open', { module, description })));
+        try {
+            await Promise.all([...pool.workers, pool.judge].map((remote) => remote.call('open', { module, description })));
+        } catch (error) {
+            pool.close();
+            throw error;
+        }
         return pool;
     }
 
