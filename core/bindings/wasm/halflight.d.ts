@@ -22,6 +22,7 @@ export interface Mesh {
 
 export interface Material {
     surface?: 'diffuse' | 'mirror' | 'metal' | 'coated' | 'glass' | 'pane';
+    /** Reflectance; black by default. */
     color?: Color;
     /** Index of a texture that multiplies `color`. */
     colorTexture?: number;
@@ -72,6 +73,7 @@ export interface Camera {
 }
 
 export interface SceneDescription extends Mesh {
+    /** One grey diffuse material by default. */
     materials?: Material[];
     textures?: Texture[];
     lights?: Light[];
@@ -159,6 +161,7 @@ export class Scene {
 
 export class Renderer {
     step(until: { samples?: number; error?: number }): void;
+    /** Samples of each pixel. */
     readonly samples: number;
     readonly method: Method;
     error(): ErrorEstimate | null;

@@ -152,6 +152,7 @@ function method(name = 'auto') {
 
 /** Number of items of `each` numbers in an array, which has no part of one. */
 function countOf(values, each, name) {
+    if (values?.length === undefined) throw new RangeError(`halflight: ${name} is no array`);
     const count = values.length / each;
     if (!Number.isInteger(count)) {
         throw new RangeError(`halflight: ${name} has ${values.length} numbers, and not a multiple of ${each}`);
@@ -283,15 +284,18 @@ export class Halflight {
 /** An object in the memory of the module. */
 class Owned {
     constructor(halflight, { memory, at }) {
-        this.halflight = halflight;
-        this.memory = memory;
-        this.at = at;
+        Object.assign(this, { halflight, memory, address: at });
+    }
+
+    get at() {
+        if (!this.address) throw new ReferenceError('halflight: the memory of this object is free');
+        return this.address;
     }
 
     /** Frees the memory: the object must not be used any more. */
     free() {
         this.halflight.blocks.give(this.memory);
-        [this.at, this.memory] = [0, undefined];
+        [this.address, this.memory] = [0, undefined];
     }
 }
 
@@ -473,12 +477,13 @@ export class Scene extends Owned {
     free() {
         super.free();
         this.textures.forEach((at) => this.halflight.blocks.give(at));
+        this.textures = [];
     }
 }
 
 /** Writes the description of a scene at `at`. */
 function describe(halflight, take, at, description, texels) {
-    const { materials = [], textures = [], lights = [], camera = {}, environment } = description;
+    const { materials = [{ color: 0.5 }], textures = [], lights = [], camera = {}, environment } = description;
     const index = (texture) => (texture === undefined || texture === null ? 0 : texture + 1);
     const list = (items, bytes) => (items.length > 0 ? take(Uint8Array, items.length * bytes) : 0);
     const [ofMaterials, ofTextures, ofLights] =

@@ -95,6 +95,8 @@ assert.throws(() => scene.renderer({ ...size, method: 'magic' }), /no method `ma
 assert.throws(() => scene.renderer({ width: 0, height: 5 }), /a picture has 1 to 2\^28 pixels/);
 assert.throws(() => halflight.scene({ ...room, triangles: Uint32Array.from([0, 1, 99, 0, 2, 3, 4, 5, 6]) }), /vertex or a material/);
 assert.throws(() => halflight.scene({ ...room, materials: [{ surface: 'slime' }] }), /`slime`; it can be diffuse/);
+assert.throws(() => halflight.scene({ triangles: room.triangles }), /positions is no array/);
+assert.throws(() => joined.free() ?? joined.picture(), /memory of this object is free/);
 assert.throws(() => scene.irradiance(new Float32Array(7)), /points has 7 numbers, and not a multiple of 6/);
 assert.throws(() => halflight.scene({ ...room, textures: [{ width: 2, height: 2, srgb: new Uint8Array(4) }] }),
     /texture 0 has 4 numbers, and not 2 x 2 x 4/);
