@@ -3,11 +3,11 @@
 
 use crate::command::{command, exists, output, run};
 use crate::{Failure, Outcome, Project};
+use core::time::Duration;
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Child, Stdio};
 use std::thread::sleep;
-use std::time::Duration;
 
 /// Samples of the pictures, and of the one that is requeued: its shards last for several checkpoints.
 const SAMPLES: [u32; 2] = [16, 512];
