@@ -108,7 +108,10 @@ mod tests {
     #[test]
     fn the_design_integrates_polynomials_of_degree_seven() {
         for (a, b, c) in (0..512).map(|i| (i % 8, i / 8 % 8, i / 64)).filter(|(a, b, c)| a + b + c <= 7) {
-            let value = |n: Vec3| n.as_dvec3().x.powi(a) * n.as_dvec3().y.powi(b) * n.as_dvec3().z.powi(c);
+            let value = |n: Vec3| {
+                let [x, y, z] = n.to_array().map(f64::from);
+                x.powi(a) * y.powi(b) * z.powi(c)
+            };
             let sum: f64 = design().into_iter().map(value).sum();
             assert!((sum / 24.0 - mean([a, b, c])).abs() < 1e-6, "{a} {b} {c}");
         }
