@@ -9,6 +9,7 @@
 //! | [`Settings`] | size of the picture, [`Method`] with its options, seed, audit |
 //! | [`Renderer`] | a picture in progress: [`Renderer::step`], [`Renderer::error`], [`Renderer::picture`] |
 //! | [`IrradianceRenderer`] | irradiance at many points, each with a 95 % interval |
+//! | [`LightProbe`] | spherical harmonics of the light around a point, from irradiances |
 //! | [`Arena`] | the caller's bytes, of which [`Renderer::required_memory`] says the number |
 //! | [`Line`] | 64 aligned bytes, of which a `Vec` or a static array makes the arena |
 //! | [`Executor`] | the caller's threads, with an example; [`Loop`] is one thread |
@@ -128,8 +129,8 @@ pub use method::{
     VirtualLightSettings, Worker,
 };
 pub use renderer::{
-    IrradianceRenderer, PointIrradiance, PointSettings, RenderError, Renderer, RequiredMemory, Settings,
-    Until,
+    IrradianceRenderer, LightProbe, PointIrradiance, PointSettings, RenderError, Renderer, RequiredMemory,
+    Settings, Until,
 };
 pub use scene::Scene;
 pub use transport::{Counters, IrradiancePoint, LightPart};

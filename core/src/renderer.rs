@@ -7,6 +7,7 @@ mod error;
 #[cfg(not(test))]
 #[doc(hidden)]
 pub mod instances;
+mod light_probe;
 mod of_features;
 mod points;
 mod reconstructing;
@@ -21,6 +22,7 @@ pub use crate::reconstruction::ReconstructionError;
 #[doc(hidden)]
 pub use audited::OutOfReach;
 pub use error::RenderError;
+pub use light_probe::LightProbe;
 pub use of_features::FeatureRenderer;
 #[doc(hidden)]
 pub use points::PointFilm;

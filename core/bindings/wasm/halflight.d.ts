@@ -22,6 +22,7 @@ export interface Mesh {
 
 export interface Material {
     surface?: 'diffuse' | 'mirror' | 'metal' | 'coated' | 'glass' | 'pane';
+    /** Reflectance; black by default. */
     color?: Color;
     /** Index of a texture that multiplies `color`. */
     colorTexture?: number;
@@ -72,6 +73,7 @@ export interface Camera {
 }
 
 export interface SceneDescription extends Mesh {
+    /** One grey diffuse material by default. */
     materials?: Material[];
     textures?: Texture[];
     lights?: Light[];
@@ -118,6 +120,15 @@ export interface Irradiance {
     samples: Uint32Array;
 }
 
+export interface Probes {
+    /** Spherical harmonics of radiance, nine colours for each place, in the order of `SphericalHarmonics3` of three.js. */
+    coefficients: Float32Array;
+    /** Half-widths of the 95 % intervals of the luminance of each coefficient. */
+    halfWidths: Float32Array;
+    /** 1 for each place inside a body. */
+    inside: Uint8Array;
+}
+
 export function load(source?: string | URL | BufferSource | WebAssembly.Module): Promise<Halflight>;
 
 export class Halflight {
@@ -141,12 +152,16 @@ export class Points {
 
 export class Scene {
     renderer(settings: Settings): Renderer;
+    /** Irradiance at points of six numbers each: position and unit normal. */
     irradiance(points: Float32Array, settings?: IrradianceSettings): Irradiance;
+    /** Light probes at places x, y, z. */
+    probes(places: Float32Array, settings?: IrradianceSettings): Probes;
     free(): void;
 }
 
 export class Renderer {
     step(until: { samples?: number; error?: number }): void;
+    /** Samples of each pixel. */
     readonly samples: number;
     readonly method: Method;
     error(): ErrorEstimate | null;

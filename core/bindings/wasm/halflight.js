@@ -18,9 +18,20 @@ export const NONE = 0xffffffff;
 export async function load(source = new URL('./halflight.wasm', import.meta.url)) {
     const isAddress = typeof source === 'string' || source instanceof URL;
     const module = source instanceof WebAssembly.Module ? source
-        : await WebAssembly.compile(isAddress ? await (await fetch(source)).arrayBuffer() : source);
+        : await WebAssembly.compile(isAddress ? await bytesAt(source) : source);
     const instance = await WebAssembly.instantiate(module, {});
     return new Halflight(module, instance.exports);
+}
+
+async function bytesAt(address) {
+    if (String(address).startsWith('file:')) {
+        // Node has no `fetch` of files. Bundlers do not follow a name in a variable.
+        const files = 'node:fs/promises';
+        return (await import(/* @vite-ignore */ files)).readFile(new URL(address));
+    }
+    const response = await fetch(address);
+    if (!response.ok) throw new Error(`halflight: ${address} is not there: ${response.status} ${response.statusText}`);
+    return response.arrayBuffer();
 }
 
 /** Blocks of the module's memory, in whole cache lines. Memory grows and is never given back to the browser. */
@@ -121,6 +132,7 @@ const MATERIAL_BYTES = 68;
 const TEXTURE_BYTES = 20;
 const LIGHT_BYTES = 48;
 const CAMERA_BYTES = 48;
+const PROBE_NORMALS = 24;
 
 const triple = (value) => (typeof value === 'number' ? [value, value, value] : [...(value ?? [0, 0, 0])]);
 
@@ -136,6 +148,26 @@ function method(name = 'auto') {
     const number = METHODS.indexOf(name);
     if (number < 0) throw new RangeError(`halflight: there is no method \`${name}\`; there are ${METHODS.join(', ')}`);
     return number;
+}
+
+/** Number of items of `each` numbers in an array, which has no part of one. */
+function countOf(values, each, name) {
+    if (values?.length === undefined) throw new RangeError(`halflight: ${name} is no array`);
+    const count = values.length / each;
+    if (!Number.isInteger(count)) {
+        throw new RangeError(`halflight: ${name} has ${values.length} numbers, and not a multiple of ${each}`);
+    }
+    return count;
+}
+
+/** Texels of a texture in the memory of the module. */
+function texelsOf(halflight, { linear, srgb, width, height }, index) {
+    const [Type, values, each] = linear ? [Float32Array, linear, 3] : [Uint8Array, srgb, 4];
+    if (values?.length !== width * height * each) {
+        const [given, wanted] = [values?.length ?? 0, `${width} x ${height} x ${each}`];
+        throw new RangeError(`halflight: texture ${index} has ${given} numbers, and not ${wanted}`);
+    }
+    return halflight.put(Type, values);
 }
 
 /** An instance of the module. */
@@ -163,7 +195,7 @@ export class Halflight {
 
     /** Eigenvalues, three for each symmetric matrix xx, xy, xz, yy, yz, zz, and their unit vectors. */
     eigen3(matrices) {
-        const count = matrices.length / 6;
+        const count = countOf(matrices, 6, 'matrices');
         return this.borrowing((take) => {
             const [entries, values, vectors] =
                 [take(Float32Array, matrices), take(Float32Array, 3 * count), take(Float32Array, 9 * count)];
@@ -231,18 +263,18 @@ export class Halflight {
 
     mesh(take, at, mesh) {
         const { positions, normals, texcoords, triangles, triangleMaterials } = mesh;
+        const vertices = countOf(positions, 3, 'positions');
+        for (const [values, count, name] of [[normals, 3 * vertices, 'normals'], [texcoords, 2 * vertices, 'texcoords'],
+            [triangleMaterials, countOf(triangles, 3, 'triangles'), 'triangleMaterials']]) {
+            if (values && values.length > 0 && values.length !== count) {
+                throw new RangeError(`halflight: ${name} has ${values.length} numbers, and not ${count}`);
+            }
+        }
         const optional = (Type, values) => (values && values.length > 0 ? take(Type, values) : 0);
         const pointers = [
             take(Float32Array, positions), optional(Float32Array, normals), optional(Float32Array, texcoords),
             take(Uint32Array, triangles), optional(Uint32Array, triangleMaterials),
         ];
-        const vertices = positions.length / 3;
-        for (const [values, count, name] of [[normals, 3 * vertices, 'normals'], [texcoords, 2 * vertices, 'texcoords'],
-            [triangleMaterials, triangles.length / 3, 'triangleMaterials']]) {
-            if (values && values.length > 0 && values.length !== count) {
-                throw new RangeError(`halflight: ${name} has ${values.length} numbers, and not ${count}`);
-            }
-        }
         return new Structure(this.view(), at).u32(
             pointers[0], 0, pointers[1], 0, pointers[2], 0, vertices, pointers[3], 0, pointers[4], triangles.length / 3,
         );
@@ -252,15 +284,18 @@ export class Halflight {
 /** An object in the memory of the module. */
 class Owned {
     constructor(halflight, { memory, at }) {
-        this.halflight = halflight;
-        this.memory = memory;
-        this.at = at;
+        Object.assign(this, { halflight, memory, address: at });
+    }
+
+    get at() {
+        if (!this.address) throw new ReferenceError('halflight: the memory of this object is free');
+        return this.address;
     }
 
     /** Frees the memory: the object must not be used any more. */
     free() {
         this.halflight.blocks.give(this.memory);
-        this.at = 0;
+        [this.address, this.memory] = [0, undefined];
     }
 }
 
@@ -276,7 +311,7 @@ export class Bvh extends Owned {
 
     /** Nearest hits of rays, seven numbers each: origin, largest t, direction. */
     nearest(rays, { coherent = false } = {}) {
-        const count = rays.length / 7;
+        const count = countOf(rays, 7, 'rays');
         return this.halflight.borrowing((take) => {
             const [from, to] = [take(Float32Array, rays), take(Float32Array, 4 * count)];
             this.halflight.check(
@@ -291,7 +326,7 @@ export class Bvh extends Owned {
 
     /** 1 for each ray that hits anything. */
     occluded(rays) {
-        const count = rays.length / 7;
+        const count = countOf(rays, 7, 'rays');
         return this.halflight.borrowing((take) => {
             const [from, to] = [take(Float32Array, rays), take(Uint8Array, count)];
             this.halflight.check(this.halflight.exports.halflight_bvh_occluded(this.at, from, count, to));
@@ -302,7 +337,7 @@ export class Bvh extends Owned {
 
 export class Points extends Owned {
     constructor(halflight, positions) {
-        const count = positions.length / 3;
+        const count = countOf(positions, 3, 'positions');
         super(halflight, halflight.borrowing((take) => {
             const from = take(Float32Array, positions);
             return halflight.object(halflight.exports.halflight_points_memory(count), (...place) =>
@@ -312,7 +347,7 @@ export class Points extends Owned {
 
     /** The at most `k` nearest points of each place, in rows of `k`, nearest first; `NONE` and infinity at their ends. */
     nearest(places, k, radius = Infinity) {
-        const [count, { exports }] = [places.length / 3, this.halflight];
+        const [count, { exports }] = [countOf(places, 3, 'places'), this.halflight];
         return this.halflight.borrowing((take) => {
             const bytes = exports.halflight_nearest_memory(k);
             const [from, work] = [take(Float32Array, places), take(Uint8Array, bytes)];
@@ -329,15 +364,21 @@ export class Points extends Owned {
 
 export class Scene extends Owned {
     constructor(halflight, description) {
-        const textures = (description.textures ?? []).map((texture) =>
-            halflight.put(texture.linear ? Float32Array : Uint8Array, texture.linear ?? texture.srgb));
-        super(halflight, halflight.borrowing((take) => {
-            const at = take(Uint8Array, MESH_BYTES + 6 * 4 + 12 + 4 + CAMERA_BYTES);
-            describe(halflight, take, at, description, textures);
-            const bytes = halflight.exports.halflight_scene_memory(at);
-            return halflight.object(bytes, (...place) => halflight.exports.halflight_scene_new(at, ...place));
-        }));
-        this.textures = textures;
+        const textures = [];
+        try {
+            const given = description.textures ?? [];
+            given.forEach((texture, index) => textures.push(texelsOf(halflight, texture, index)));
+            super(halflight, halflight.borrowing((take) => {
+                const at = take(Uint8Array, MESH_BYTES + 6 * 4 + 12 + 4 + CAMERA_BYTES);
+                describe(halflight, take, at, description, textures);
+                const bytes = halflight.exports.halflight_scene_memory(at);
+                return halflight.object(bytes, (...place) => halflight.exports.halflight_scene_new(at, ...place));
+            }));
+        } catch (error) {
+            textures.forEach((at) => halflight.blocks.give(at));
+            throw error;
+        }
+        Object.assign(this, { textures, description });
     }
 
     /** A picture in progress. */
@@ -346,46 +387,103 @@ export class Scene extends Owned {
     }
 
     /** Irradiance at points, six numbers each: position and unit normal. Returns arrays of the values of all points. */
-    irradiance(points, { samples = 0, error = 0, light = 'all', seed = 0, maxDepth = 0 } = {}) {
+    irradiance(points, settings) {
+        return this.halflight.borrowing((take) => {
+            const [at, count] = this.irradianceIn(take, points, settings);
+            const numbers = this.halflight.array(Float32Array, at, 6 * count);
+            const whole = new Uint32Array(numbers.buffer);
+            const column = (offset) => Float32Array.from({ length: count }, (_, i) => numbers[6 * i + offset]);
+            return {
+                irradiance: Float32Array.from({ length: 3 * count }, (_, i) =>
+                    numbers[6 * Math.floor(i / 3) + (i % 3)]),
+                lower: column(3),
+                upper: column(4),
+                samples: Uint32Array.from({ length: count }, (_, i) => whole[6 * i + 5]),
+            };
+        });
+    }
+
+    /** Values of the irradiance at points in memory of `take`: their address, and their number. */
+    irradianceIn(take, points, { samples = 0, error = 0, light = 'all', seed = 0, maxDepth = 0 } = {}) {
         const [{ halflight }, { exports }] = [this, this.halflight];
-        const count = points.length / 6;
+        const count = countOf(points, 6, 'points');
         const limit = samples === 0 && error === 0 ? 256 : samples;
+        const [from, settings] = [take(Float32Array, points), take(Uint8Array, 16)];
+        new Structure(halflight.view(), settings)
+            .u32(choice(LIGHT_PARTS, light, 'light'), seed, maxDepth).bool(true);
+        const { memory, at } = halflight.object(exports.halflight_irradiance_memory(this.at, count, 1),
+            (...place) => exports.halflight_irradiance_new(this.at, from, count, settings, 0, ...place));
+        try {
+            halflight.check(exports.halflight_irradiance_step(at, 0, limit, error));
+            const values = take(Float32Array, 6 * count);
+            halflight.check(exports.halflight_irradiance_values(at, values, count));
+            return [values, count];
+        } finally {
+            halflight.blocks.give(memory);
+        }
+    }
+
+    /**
+     * Light probes at places x, y, z, from irradiances by 24 normals: coefficients of spherical harmonics of
+     * radiance, nine colours for each place in the order of `SphericalHarmonics3` of three.js, half-widths of the
+     * 95 % intervals of their luminances, and 1 for each place inside a body.
+     */
+    probes(places, settings) {
+        const [{ halflight }, { exports }] = [this, this.halflight];
+        const count = countOf(places, 3, 'places');
         return halflight.borrowing((take) => {
-            const from = take(Float32Array, points);
-            const settings = take(Uint8Array, 16);
-            new Structure(halflight.view(), settings)
-                .u32(choice(LIGHT_PARTS, light, 'light'), seed, maxDepth).bool(true);
-            const { memory, at } = halflight.object(exports.halflight_irradiance_memory(this.at, count, 1),
-                (...place) => exports.halflight_irradiance_new(this.at, from, count, settings, 0, ...place));
-            try {
-                halflight.check(exports.halflight_irradiance_step(at, 0, limit, error));
-                const values = take(Float32Array, 6 * count);
-                halflight.check(exports.halflight_irradiance_values(at, values, count));
-                const numbers = halflight.array(Float32Array, values, 6 * count);
-                const whole = new Uint32Array(numbers.buffer);
-                const column = (offset) => Float32Array.from({ length: count }, (_, i) => numbers[6 * i + offset]);
-                return {
-                    irradiance: Float32Array.from({ length: 3 * count }, (_, i) =>
-                        numbers[6 * Math.floor(i / 3) + (i % 3)]),
-                    lower: column(3),
-                    upper: column(4),
-                    samples: Uint32Array.from({ length: count }, (_, i) => whole[6 * i + 5]),
-                };
-            } finally {
-                halflight.blocks.give(memory);
-            }
+            const at = take(Float32Array, 3 * PROBE_NORMALS);
+            halflight.check(exports.halflight_probe_normals(at));
+            const normals = halflight.array(Float32Array, at, 3 * PROBE_NORMALS);
+            const bundles = Float32Array.from({ length: 6 * PROBE_NORMALS * count }, (_, i) => {
+                const [point, k] = [Math.floor(i / 6), i % 6];
+                const [place, normal] = [Math.floor(point / PROBE_NORMALS), point % PROBE_NORMALS];
+                return k < 3 ? places[3 * place + k] : normals[3 * normal + k - 3];
+            });
+            const [values] = this.irradianceIn(take, bundles, settings);
+            const to = take(Float32Array, 36 * count);
+            halflight.check(exports.halflight_probes(values, count, to));
+            const numbers = halflight.array(Float32Array, to, 36 * count);
+            const part = (first, length) => Float32Array.from({ length: length * count }, (_, i) =>
+                numbers[36 * Math.floor(i / length) + first + (i % length)]);
+            return { coefficients: part(0, 27), halfWidths: part(27, 9), inside: this.inside(bundles, count) };
+        });
+    }
+
+    /** 1 for each place from which more than a quarter of its rays first meet the back of a triangle. */
+    inside(bundles, count) {
+        const { positions, triangles } = this.description;
+        const rays = Float32Array.from({ length: (bundles.length / 6) * 7 }, (_, i) => {
+            const [ray, k] = [Math.floor(i / 7), i % 7];
+            return k === 3 ? Infinity : bundles[6 * ray + (k < 3 ? k : k - 1)];
+        });
+        const bvh = this.halflight.bvh({ positions, triangles });
+        const { triangle } = bvh.nearest(rays);
+        bvh.free();
+        const isBack = (ray) => {
+            if (triangle[ray] === NONE) return false;
+            const corner = (i) => positions.subarray(3 * triangles[3 * triangle[ray] + i]);
+            const [a, b, c] = [corner(0), corner(1), corner(2)];
+            const [u, v] = [b, c].map((other) => [0, 1, 2].map((k) => other[k] - a[k]));
+            const normal = [0, 1, 2].map((k) => u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3]);
+            return normal.reduce((sum, value, k) => sum + value * bundles[6 * ray + 3 + k], 0) > 0;
+        };
+        return Uint8Array.from({ length: count }, (_, place) => {
+            const all = Array.from({ length: PROBE_NORMALS }, (_, i) => isBack(PROBE_NORMALS * place + i));
+            return all.filter(Boolean).length > PROBE_NORMALS / 4 ? 1 : 0;
         });
     }
 
     free() {
         super.free();
         this.textures.forEach((at) => this.halflight.blocks.give(at));
+        this.textures = [];
     }
 }
 
 /** Writes the description of a scene at `at`. */
 function describe(halflight, take, at, description, texels) {
-    const { materials = [], textures = [], lights = [], camera = {}, environment } = description;
+    const { materials = [{ color: 0.5 }], textures = [], lights = [], camera = {}, environment } = description;
     const index = (texture) => (texture === undefined || texture === null ? 0 : texture + 1);
     const list = (items, bytes) => (items.length > 0 ? take(Uint8Array, items.length * bytes) : 0);
     const [ofMaterials, ofTextures, ofLights] =

@@ -1,4 +1,6 @@
-import type { ErrorEstimate, Irradiance, IrradianceSettings, Method, SceneDescription, Settings } from './halflight.js';
+import type {
+    ErrorEstimate, Irradiance, IrradianceSettings, Method, Probes, SceneDescription, Settings,
+} from './halflight.js';
 
 export interface State {
     picture: Float32Array | null;
@@ -18,5 +20,6 @@ export class Pool {
         options?: { samples?: number; error?: number; signal?: AbortSignal; onProgress?: (state: State) => void | Promise<void> },
     ): Promise<State>;
     irradiance(points: Float32Array, settings?: IrradianceSettings): Promise<Irradiance>;
+    probes(places: Float32Array, settings?: IrradianceSettings): Promise<Probes>;
     close(): void;
 }

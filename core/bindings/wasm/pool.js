@@ -38,7 +38,12 @@ export class Pool {
         const pool = new Pool();
         pool.workers = Array.from({ length: Math.max(1, count) }, () => new Remote());
         pool.judge = new Remote();
-        await Promise.all([...pool.workers, pool.judge].map((remote) => remote.call('open', { module, description })));
+        try {
+            await Promise.all([...pool.workers, pool.judge].map((remote) => remote.call('open', { module, description })));
+        } catch (error) {
+            pool.close();
+            throw error;
+        }
         return pool;
     }
 
@@ -76,20 +81,25 @@ export class Pool {
     }
 
     /** Irradiance at points as by `Scene.irradiance`, divided among the workers. */
-    async irradiance(points, settings) {
-        const count = points.length / 6;
-        const each = Math.ceil(count / this.workers.length);
+    irradiance(points, settings) {
+        return this.divided('irradiance', points, 6, settings);
+    }
+
+    /** Light probes at places as by `Scene.probes`, divided among the workers. */
+    probes(places, settings) {
+        return this.divided('probes', places, 3, settings);
+    }
+
+    /** Arrays for items of `size` numbers, of which each worker gets a part. */
+    async divided(name, items, size, settings) {
+        const each = size * Math.ceil(items.length / size / this.workers.length);
         const parts = await Promise.all(this.workers.map((worker, i) => {
-            const part = points.slice(6 * i * each, 6 * (i + 1) * each);
-            return part.length > 0 ? worker.call('irradiance', { points: part, settings }) : null;
+            const part = items.slice(i * each, (i + 1) * each);
+            return part.length > 0 || i === 0 ? worker.call(name, { items: part, settings }) : null;
         }));
-        const joined = (name, Type) => Type.from(parts.filter(Boolean).flatMap((part) => [...part[name]]));
-        return {
-            irradiance: joined('irradiance', Float32Array),
-            lower: joined('lower', Float32Array),
-            upper: joined('upper', Float32Array),
-            samples: joined('samples', Uint32Array),
-        };
+        const [first, ...others] = parts.filter(Boolean);
+        const joined = (key) => [first, ...others].flatMap((part) => [...part[key]]);
+        return Object.fromEntries(Object.keys(first).map((key) => [key, first[key].constructor.from(joined(key))]));
     }
 
     /** Ends the workers. */

@@ -210,3 +210,33 @@ export function framing(positions, fov = 40) {
     const along = [0.35, 0.3, 1].map((value) => value / Math.hypot(0.35, 0.3, 1));
     return { eye: target.map((value, i) => value + distance * along[i]), target, up: [0, 1, 0], fov };
 }
+
+/**
+ * The light of `probes` at the places of `grid` (`probeGrid` of probes.js) as a `LightProbeGridWebGL` of three.js, to be
+ * added to a scene. `THREE` is the module `three` with this class of `three/addons/lighting`.
+ */
+export function toProbeGrid({ Data3DTexture, DataUtils, HalfFloatType, LinearFilter, LightProbeGridWebGL }, grid, probes) {
+    const { size: [width, height, depth], box: [low, high] } = grid;
+    const light = new LightProbeGridWebGL(...high.map((value, axis) => value - low[axis]), width, height, depth);
+    light.position.set(...low.map((value, axis) => (value + high[axis]) / 2));
+    light.updateBoundingBox();
+    // Seven volumes of four of the 27 numbers, each between copies of its first and last slice.
+    const slices = depth + 2;
+    const texels = new Uint16Array(7 * slices * width * height * 4);
+    for (let volume = 0; volume < 7; volume++) {
+        for (let slice = 0; slice < slices; slice++) {
+            const z = Math.min(Math.max(slice - 1, 0), depth - 1);
+            for (let cell = 0; cell < width * height; cell++) {
+                const first = 4 * (cell + width * height * (slice + slices * volume));
+                for (let i = 0; i < 4 && 4 * volume + i < 27; i++) {
+                    const value = probes.coefficients[27 * (cell + width * height * z) + 4 * volume + i];
+                    texels[first + i] = DataUtils.toHalfFloat(Math.min(Math.max(value, -65504), 65504));
+                }
+            }
+        }
+    }
+    const texture = new Data3DTexture(texels, width, height, 7 * slices);
+    Object.assign(texture, { type: HalfFloatType, minFilter: LinearFilter, magFilter: LinearFilter, needsUpdate: true });
+    light.texture = texture;
+    return light;
+}

@@ -40,8 +40,12 @@ const answers = {
         return { picture, error: renderer.error(), samples: renderer.samples, transfer: [picture.buffer] };
     },
 
-    irradiance({ points, settings }) {
-        return scene.irradiance(points, settings);
+    irradiance({ items, settings }) {
+        return scene.irradiance(items, settings);
+    },
+
+    probes({ items, settings }) {
+        return scene.probes(items, settings);
     },
 };
 

@@ -4,7 +4,6 @@
 
 mod charts;
 mod grid;
-mod harmonics;
 mod ktx2;
 mod lightmap;
 mod map;

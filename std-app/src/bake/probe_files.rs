@@ -1,8 +1,7 @@
 //! Files of probes: JSON for three.js, a table, and KTX2 with an ambient cube for Bevy.
 
-use super::harmonics::AXES;
 use super::ktx2;
-use super::probes::{Probe, ProbeGrid};
+use super::probes::{AXES, Probe, ProbeGrid};
 use core::f32::consts::FRAC_1_PI;
 use halflight_core::Rgb;
 use serde_json::{Value, json};

@@ -3,16 +3,17 @@
 //! near ones.
 
 use super::grid::Grid;
-use super::harmonics::{AXES, COSINE, design, harmonics};
 use crate::load::LoadedScene;
 use crate::memory::{Budget, Shortage};
 use crate::render::Baked;
-use core::f32::consts::PI;
 use glam::Vec3;
-use halflight_core::{IrradiancePoint, PointIrradiance, Rgb};
+use halflight_core::{IrradiancePoint, LightProbe, PointIrradiance, Rgb};
 
 /// Fraction of back faces from which a probe is inside a body: half below a ground without a bottom.
 const INSIDE: f32 = 0.25;
+
+/// The six directions of the axes: +x, -x, +y, -y, +z, -z.
+pub(super) const AXES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
 
 /// Settings of a grid of probes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +58,7 @@ impl ProbeGrid {
     /// Insufficient memory.
     pub fn new(loaded: &LoadedScene, settings: ProbeSettings, budget: &mut Budget) -> Result<Self, Shortage> {
         let normals: Vec<Vec3> =
-            design().into_iter().chain(AXES.into_iter().filter(|_| settings.cubes)).collect();
+            LightProbe::normals().into_iter().chain(AXES.into_iter().filter(|_| settings.cubes)).collect();
         let count = settings.size.iter().fold(1usize, |count, side| count.saturating_mul(*side as usize));
         budget.take(count.saturating_mul(size_of::<Probe>()))?;
         budget.has(count.saturating_mul(normals.len() * size_of::<IrradiancePoint>()))?;
@@ -118,28 +119,19 @@ impl ProbeGrid {
     fn probe(&self, values: &[PointIrradiance], shares: &[f32]) -> Probe {
         let back_faces = shares.iter().sum::<f32>() / shares.len() as f32;
         let is_sampled = values.iter().all(|value| value.samples > 0);
-        let mut probe =
-            Probe { back_faces, is_valid: back_faces <= INSIDE && is_sampled, ..Probe::default() };
-        let (of_design, of_axes) = values.split_at(values.len().min(design().len()));
-        let solid_angle = 4.0 * PI / of_design.len() as f32;
-        for (value, normal) in of_design.iter().zip(&self.normals) {
-            for (i, harmonic) in harmonics(*normal).into_iter().enumerate() {
-                let weight = solid_angle * harmonic / COSINE[i];
-                probe.coefficients[i] += weight * value.irradiance;
-                let half_width = weight.abs() * (value.upper - value.value());
-                probe.half_widths[i] = probe.half_widths[i].hypot(half_width);
-            }
-        }
-        probe.cube.iter_mut().zip(of_axes).for_each(|(side, value)| *side = value.irradiance);
-        probe
+        let (of_light, of_axes) = values.split_at(values.len().min(LightProbe::NORMALS));
+        let LightProbe { coefficients, half_widths } = LightProbe::of(of_light);
+        let mut cube = [Rgb::ZERO; 6];
+        cube.iter_mut().zip(of_axes).for_each(|(side, value)| *side = value.irradiance);
+        Probe { coefficients, half_widths, cube, back_faces, is_valid: back_faces <= INSIDE && is_sampled }
     }
 }
 
 impl Probe {
     /// Irradiance of a unit `normal` by the coefficients.
     pub fn irradiance(&self, normal: Vec3) -> Rgb {
-        let basis = harmonics(normal).into_iter().zip(COSINE);
-        basis.zip(self.coefficients).map(|((harmonic, cosine), colour)| harmonic * cosine * colour).sum()
+        let Self { coefficients, half_widths, .. } = *self;
+        LightProbe { coefficients, half_widths }.irradiance(normal)
     }
 }
 

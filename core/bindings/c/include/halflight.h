@@ -12,6 +12,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// Number of the normals of a light probe.
+#define HALFLIGHT_PROBE_NORMALS 24
+
 // Most neighbours of a search.
 #define HALFLIGHT_MOST_NEIGHBOURS 1024
 
@@ -178,6 +181,15 @@ typedef struct {
     // Number of samples.
     uint32_t samples;
 } HalflightIrradiance;
+
+// Light around a place: coefficients of spherical harmonics of radiance, in the order 1, y, z, x, xy, yz,
+// 3z^2 - 1, xz, x^2 - y^2.
+typedef struct {
+    // Coefficients, three floats each.
+    float coefficients[9][3];
+    // Half-widths of the 95 % intervals of their luminances.
+    float half_widths[9];
+} HalflightProbe;
 
 // Settings of a picture. Zeros but for the size are the usual ones.
 typedef struct {
@@ -416,6 +428,20 @@ HalflightStatus halflight_irradiance_step(HalflightIrradianceRenderer *renderer,
 HalflightStatus halflight_irradiance_values(const HalflightIrradianceRenderer *renderer,
                                             HalflightIrradiance *values,
                                             size_t count);
+
+// Writes the normals of the `HALFLIGHT_PROBE_NORMALS` points of a probe, three floats each.
+//
+// Requires:
+// `normals` has `3 * HALFLIGHT_PROBE_NORMALS` floats.
+HalflightStatus halflight_probe_normals(float *normals);
+
+// Writes `count` probes from irradiances by their normals, `HALFLIGHT_PROBE_NORMALS` values for each.
+//
+// Requires:
+// `values` has `count * HALFLIGHT_PROBE_NORMALS` elements that no one writes; `probes` has `count`.
+HalflightStatus halflight_probes(const HalflightIrradiance *values,
+                                 size_t count,
+                                 HalflightProbe *probes);
 
 // Bytes of a picture of `scene` and the `threads` of an executor; 0 of null or settings that do not exist.
 //

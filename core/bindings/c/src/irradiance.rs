@@ -8,7 +8,7 @@ use crate::status::{HalflightStatus, of};
 use core::ffi::c_void;
 use halflight_core::glam::Vec3;
 use halflight_core::memory::{Arena, Footprint};
-use halflight_core::{IrradiancePoint, IrradianceRenderer, Until};
+use halflight_core::{IrradiancePoint, IrradianceRenderer, LightProbe, PointIrradiance, Until};
 
 /// A place with the unit normal of its hemisphere. Points within rounding of a surface are put on it.
 #[derive(Clone, Copy)]
@@ -134,6 +134,59 @@ pub unsafe extern "C" fn halflight_irradiance_values(
             let irradiance = value.irradiance.to_array();
             let (lower, upper, samples) = (value.lower, value.upper, value.samples);
             *to = HalflightIrradiance { irradiance, lower, upper, samples };
+        }
+    }))
+}
+
+/// Number of the normals of a light probe.
+pub const HALFLIGHT_PROBE_NORMALS: usize = 24;
+
+/// Light around a place: coefficients of spherical harmonics of radiance, in the order 1, y, z, x, xy, yz,
+/// 3z^2 - 1, xz, x^2 - y^2.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct HalflightProbe {
+    /// Coefficients, three floats each.
+    pub coefficients: [[f32; 3]; 9],
+    /// Half-widths of the 95 % intervals of their luminances.
+    pub half_widths: [f32; 9],
+}
+
+/// Writes the normals of the `HALFLIGHT_PROBE_NORMALS` points of a probe, three floats each.
+///
+/// # Safety
+/// `normals` has `3 * HALFLIGHT_PROBE_NORMALS` floats.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn halflight_probe_normals(normals: *mut f32) -> HalflightStatus {
+    // SAFETY: by the caller; arrays of floats have the alignment of their elements.
+    let normals = unsafe { array_mut(normals.cast::<[f32; 3]>(), HALFLIGHT_PROBE_NORMALS) };
+    of(normals.map(|normals| {
+        normals.iter_mut().zip(LightProbe::normals()).for_each(|(to, normal)| *to = normal.to_array());
+    }))
+}
+
+/// Writes `count` probes from irradiances by their normals, `HALFLIGHT_PROBE_NORMALS` values for each.
+///
+/// # Safety
+/// `values` has `count * HALFLIGHT_PROBE_NORMALS` elements that no one writes; `probes` has `count`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn halflight_probes(
+    values: *const HalflightIrradiance,
+    count: usize,
+    probes: *mut HalflightProbe,
+) -> HalflightStatus {
+    let number = count.saturating_mul(HALFLIGHT_PROBE_NORMALS);
+    // SAFETY: by the caller.
+    let arrays = unsafe { (|| Ok((array(values, number)?, array_mut(probes, count)?)))() };
+    of(arrays.map(|(values, probes)| {
+        for (to, values) in probes.iter_mut().zip(values.chunks_exact(HALFLIGHT_PROBE_NORMALS)) {
+            let mut of_normals = [PointIrradiance::default(); HALFLIGHT_PROBE_NORMALS];
+            for (to, value) in of_normals.iter_mut().zip(values) {
+                let HalflightIrradiance { irradiance, lower, upper, samples } = *value;
+                *to = PointIrradiance { irradiance: irradiance.into(), lower, upper, samples };
+            }
+            let LightProbe { coefficients, half_widths } = LightProbe::of(&of_normals);
+            *to = HalflightProbe { coefficients: coefficients.map(|c| c.to_array()), half_widths };
         }
     }))
 }

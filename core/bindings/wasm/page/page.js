@@ -1,9 +1,9 @@
-// The page: a scene from files, its picture and error while it renders, and a bake of its vertices.
+// The page: a scene from files, its picture and error while it renders, and bakes of its light.
 import * as THREE from 'three';
-import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { toExr, toRgba } from '../halflight.js';
 import { Pool } from '../pool.js';
-import { framing, fromThree } from '../three.js';
+import { fromThree } from '../three.js';
+import { View, bakeProbes, bakeVertices } from './baked.js';
 
 const element = (id) => document.getElementById(id);
 const page = { description: box(), object: null, pool: null, stop: null, state: null, curve: [], gate: null };
@@ -171,61 +171,26 @@ function save(name, blob) {
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** Bakes the irradiance of all vertices, and shows it by three.js: radiance of a surface is albedo × irradiance / π. */
-async function bake({ samples = 256 } = {}) {
+/** Bakes the vertices or a grid of probes, and shows them by three.js. */
+async function bake(kind, settings = {}) {
     page.stop?.abort();
     proceed();
-    say('Irradiance of the vertices is being estimated.');
-    const { positions, normals, triangles, triangleMaterials, materials } = page.description;
-    // Vertices without normals have those of a triangle.
-    const count = positions.length / 3;
-    const normal = Float32Array.from({ length: positions.length }, (_, i) => normals?.[i] ?? 0);
-    for (let i = 0; i < triangles.length && !normals; i += 3) {
-        const [a, b, c] = [0, 1, 2].map((k) => new THREE.Vector3().fromArray(positions, 3 * triangles[i + k]));
-        const n = b.sub(a).cross(c.sub(a)).normalize().toArray();
-        for (let k = 0; k < 3; k++) normal.set(n, 3 * triangles[i + k]);
-    }
-    const points = Float32Array.from({ length: 6 * count }, (_, i) => {
-        const [vertex, k] = [Math.floor(i / 6), i % 6];
-        return k < 3 ? positions[3 * vertex + k] : normal[3 * vertex + k - 3];
-    });
-    const { irradiance, lower, upper } = await (await pool()).irradiance(points, { samples });
-    const geometry = new THREE.BufferGeometry();
-    const [corners, colors] = [[], []];
-    for (let i = 0; i < triangles.length; i++) {
-        const { color, emission } = materials[triangleMaterials[Math.floor(i / 3)]];
-        const vertex = triangles[i];
-        corners.push(...positions.slice(3 * vertex, 3 * vertex + 3));
-        for (let k = 0; k < 3; k++) colors.push(emission[k] + (color[k] * irradiance[3 * vertex + k]) / Math.PI);
-    }
-    geometry.setAttribute('position', new THREE.Float32BufferAttribute(corners, 3));
-    geometry.setAttribute('color', new THREE.Float32BufferAttribute(colors, 3));
-    const scene = new THREE.Scene();
-    scene.add(new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide })));
+    say('Irradiance is being estimated.');
+    const { baked, scene, text } = await kind(page.description, await pool(), { samples: 256, ...settings });
     element('picture').hidden = true;
-    const canvas = element('baked');
-    canvas.hidden = false;
-    const renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
-    renderer.setSize(Number(element('width').value), Number(element('height').value), false);
-    const { eye, target, fov } = page.description.camera ?? framing(positions);
-    const camera = new THREE.PerspectiveCamera(fov, canvas.width / canvas.height, 0.01, 1e5);
-    camera.position.set(...eye);
-    camera.lookAt(...target);
-    const controls = new OrbitControls(camera, canvas);
-    controls.target.set(...target);
-    const show = () => renderer.render(scene, camera);
-    controls.addEventListener('change', show);
-    show();
-    const widths = Array.from(lower, (low, i) => (upper[i] - low) / Math.max(upper[i] + low, 1e-9)).sort((a, b) => a - b);
-    say(`${count.toLocaleString('en')} vertices with ${samples} samples each; median half-width of the 95 % intervals ${(100 * widths[count >> 1]).toFixed(1)} %`);
-    return { irradiance, lower, upper };
+    element('baked').hidden = false;
+    page.view ??= new View(element('baked'));
+    page.view.show(scene, page.description, ['width', 'height'].map((id) => Number(element(id).value)));
+    say(text);
+    return baked;
 }
 
 /** Runs work of a button, and shows its failure. */
 const acting = (work) => () => Promise.resolve(work()).catch((error) => say(`This did not work: ${error.message ?? error}`));
 
 element('render').onclick = acting(() => render());
-element('bake').onclick = acting(() => bake());
+element('vertices').onclick = acting(() => bake(bakeVertices));
+element('probes').onclick = acting(() => bake(bakeProbes));
 element('pause').onclick = () => {
     if (page.gate) return proceed();
     page.gate = {};
@@ -254,5 +219,5 @@ document.body.ondrop = (event) => {
 };
 
 // For tests and for the console.
-Object.assign(window, { halflight: { page, render, bake, open } });
+Object.assign(window, { halflight: { page, render, bake, bakeProbes, bakeVertices, open } });
 document.documentElement.dataset.ready = 'true';

@@ -1,6 +1,6 @@
 //! The interfaces of the core for C and for the web: built, called by programs of these languages.
 
-use crate::command::{command, exists, run};
+use crate::command::{command, exists, output, run};
 use crate::targets::cross_cargo;
 use crate::{Failure, Outcome, Project};
 use std::fs;
@@ -22,7 +22,10 @@ pub(crate) fn c(project: &Project) -> Outcome {
     Ok("header, programs in C and C++".to_owned())
 }
 
-/// Builds the module for the web, and calls it under node and in a browser.
+/// Packages that check the types of the module and bundle its page.
+const WEB_TOOLS: &str = "typescript@5.9.3 vite@7 three@0.187.0";
+
+/// Builds the module for the web, and calls it under node, as a package, and in a browser.
 pub(crate) fn web(project: &Project) -> Outcome {
     if !exists("node") {
         return Err(Failure::Missing("no node: apt-get install nodejs".to_owned()));
@@ -37,8 +40,33 @@ pub(crate) fn web(project: &Project) -> Outcome {
     let bytes = fs::copy(built, &module).map_err(io)?;
     let line = "cargo test --profile quick --locked --quiet web";
     run(command(&folder, line).env("CARGO_TARGET_DIR", project.root.join("target")))?;
+    package(project)?;
     let line =
         "cargo test --profile quick --locked --quiet -p halflight-tests --test main web_page:: -- --ignored";
     run(&mut command(&project.root, line))?;
-    Ok(format!("{bytes} bytes: bits of the native library, and its page"))
+    Ok(format!("{bytes} bytes: bits of the native library, its package and its page"))
+}
+
+/// Installs the packed module into an empty folder: its types hold, a program runs, and a bundler builds the
+/// page.
+fn package(project: &Project) -> Result<(), Failure> {
+    let io = |error: std::io::Error| Failure::Failed(format!("the package for npm: {error}"));
+    let source = project.root.join("core/bindings/wasm");
+    let folder = project.root.join("target/npm");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).map_err(io)?;
+    let archive = output(command(&source, "npm pack --silent --pack-destination").arg(&folder))?;
+    fs::write(folder.join("package.json"), r#"{ "private": true, "type": "module" }"#).map_err(io)?;
+    fs::copy(source.join("test/types.ts"), folder.join("types.ts")).map_err(io)?;
+    let compiler = "node_modules/typescript/bin/tsc --strict --target es2022 --module nodenext";
+    let page = "node_modules/vite/bin/vite.js build node_modules/halflight/page --logLevel error";
+    for line in [
+        format!("npm install --silent --no-audit --no-fund {WEB_TOOLS} ./{archive}"),
+        format!("node {compiler} --lib es2022,dom types.ts"),
+        "node types.js".to_owned(),
+        format!("node {page} --target es2022 --emptyOutDir --outDir {}", folder.join("page").display()),
+    ] {
+        run(&mut command(&folder, &line))?;
+    }
+    Ok(())
 }

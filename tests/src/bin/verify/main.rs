@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod bindings;
+mod cluster;
 mod command;
 mod doors;
 mod fuzz;
@@ -39,6 +40,8 @@ enum When {
     Quick,
     /// The run of the interfaces for other languages, which need compilers and browsers of their own.
     Bindings,
+    /// None: named alone, since it needs schedulers.
+    Cluster,
 }
 
 /// The name of all quick steps.
@@ -77,6 +80,7 @@ const STEPS: &[Step] = &[
     step("web", "the module for browsers: bits, types, its page", bindings::web, When::Bindings),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
     step("python", "the wheel of the Python package passes its tests", python::check, When::Bindings),
+    step("cluster", "parts under Slurm and others: bits of one run", cluster::check, When::Cluster),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
     step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),
 ];

@@ -1,14 +1,68 @@
 //! Spherical harmonics of radiance from irradiances by a bundle of normals (Ramamoorthi and Hanrahan 2001).
 
+use super::PointIrradiance;
+use crate::Rgb;
 use core::f32::consts::{FRAC_PI_4, PI};
 use glam::Vec3;
+
+/// Light around a point: spherical harmonics of radiance to degree 2, in the order 1, y, z, x, xy, yz,
+/// 3z² - 1, xz, x² - y², as `SphericalHarmonics3` of three.js has them.
+///
+/// ```
+/// use halflight_core::glam::Vec3;
+/// use halflight_core::renderer::{LightProbe, PointIrradiance};
+/// use halflight_core::Rgb;
+///
+/// // Irradiances of a white sky by all normals, in place of those of an `IrradianceRenderer`.
+/// let irradiance = Rgb::splat(core::f32::consts::PI);
+/// let of_sky = PointIrradiance { irradiance, lower: 3.0, upper: 3.3, samples: 64 };
+/// let probe = LightProbe::of(&LightProbe::normals().map(|_| of_sky));
+/// assert!((probe.irradiance(Vec3::X) - irradiance).length() < 1e-4);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LightProbe {
+    /// Coefficients of radiance.
+    pub coefficients: [Rgb; 9],
+    /// Half-widths of the 95 % intervals of their luminances.
+    pub half_widths: [f32; 9],
+}
+
+impl LightProbe {
+    /// Number of the normals of a probe.
+    pub const NORMALS: usize = 24;
+
+    /// The unit normals at which a probe takes irradiances: a spherical 7-design.
+    pub fn normals() -> [Vec3; Self::NORMALS] {
+        design()
+    }
+
+    /// The probe of `values`, the irradiances by [`LightProbe::normals`].
+    pub fn of(values: &[PointIrradiance]) -> Self {
+        let solid_angle = 4.0 * PI / Self::NORMALS as f32;
+        let mut probe = Self::default();
+        for (value, normal) in values.iter().zip(design()) {
+            for (i, harmonic) in harmonics(normal).into_iter().enumerate() {
+                let weight = solid_angle * harmonic / COSINE[i];
+                probe.coefficients[i] += weight * value.irradiance;
+                let half_width = weight.abs() * (value.upper - value.value());
+                probe.half_widths[i] = libm::hypotf(probe.half_widths[i], half_width);
+            }
+        }
+        probe
+    }
+
+    /// Irradiance of a unit `normal`.
+    pub fn irradiance(&self, normal: Vec3) -> Rgb {
+        let basis = harmonics(normal).into_iter().zip(COSINE);
+        basis.zip(self.coefficients).map(|((harmonic, cosine), colour)| harmonic * cosine * colour).sum()
+    }
+}
 
 /// Coordinates of a point whose images under the rotations of a cube are a spherical 7-design (McLaren 1963):
 /// sums over them integrate polynomials of degree 7. Their squares are the roots of z³ - z² + z/5 - 1/105.
 const DESIGN: [f32; 3] = [0.266_635_4, 0.422_518_65, 0.866_246_8];
 
-/// The 24 normals of a spherical 7-design.
-pub(super) fn design() -> [Vec3; 24] {
+fn design() -> [Vec3; LightProbe::NORMALS] {
     const PERMUTATIONS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     core::array::from_fn(|number| {
         let (permutation, signs) = (number / 4, number % 4);
@@ -20,11 +74,8 @@ pub(super) fn design() -> [Vec3; 24] {
     })
 }
 
-/// The six directions of the axes: +x, -x, +y, -y, +z, -z.
-pub(super) const AXES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-
 /// Real spherical harmonics to degree 2, in the order 1, y, z, x, xy, yz, 3z² - 1, xz, x² - y².
-pub(super) fn harmonics(Vec3 { x, y, z }: Vec3) -> [f32; 9] {
+fn harmonics(Vec3 { x, y, z }: Vec3) -> [f32; 9] {
     let quadratic = [x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y];
     let scales = [1.092_548_4, 1.092_548_4, 0.315_391_57, 1.092_548_4, 0.546_274_2];
     let linear = [y, z, x].map(|axis| 0.488_602_52 * axis);
@@ -36,7 +87,7 @@ pub(super) fn harmonics(Vec3 { x, y, z }: Vec3) -> [f32; 9] {
 }
 
 /// Factors of the harmonics of radiance that give those of irradiance.
-pub(super) const COSINE: [f32; 9] = {
+const COSINE: [f32; 9] = {
     const LINEAR: f32 = 2.0 * PI / 3.0;
     [PI, LINEAR, LINEAR, LINEAR, FRAC_PI_4, FRAC_PI_4, FRAC_PI_4, FRAC_PI_4, FRAC_PI_4]
 };
@@ -57,7 +108,10 @@ mod tests {
     #[test]
     fn the_design_integrates_polynomials_of_degree_seven() {
         for (a, b, c) in (0..512).map(|i| (i % 8, i / 8 % 8, i / 64)).filter(|(a, b, c)| a + b + c <= 7) {
-            let value = |n: Vec3| n.as_dvec3().x.powi(a) * n.as_dvec3().y.powi(b) * n.as_dvec3().z.powi(c);
+            let value = |n: Vec3| {
+                let [x, y, z] = n.to_array().map(f64::from);
+                x.powi(a) * y.powi(b) * z.powi(c)
+            };
             let sum: f64 = design().into_iter().map(value).sum();
             assert!((sum / 24.0 - mean([a, b, c])).abs() < 1e-6, "{a} {b} {c}");
         }
