@@ -48,8 +48,8 @@
 //! ```
 //! # Features
 //!
-//! All are on by default: `cli`, the command line; `report`, pages and objects; `gltf`; `formats`, pictures in
-//! OpenEXR, TIFF and WebP; `sky`; `tev`, the viewer. A file that needs another feature is refused by its name.
+//! All are on by default: `cli`, the command line; `report`, pages and objects; `gltf`; `formats`, pictures
+//! in OpenEXR, TIFF and WebP; `sky`; `tev`, the viewer. A file is refused that needs a feature left out.
 #![forbid(unsafe_code)]
 
 // The command line names the library as other programs do.

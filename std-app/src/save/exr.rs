@@ -5,8 +5,7 @@
 //! put the name of a part before those of its channels, unless it stands there. Attributes stand in the
 //! headers of all parts, because some readers look into the first alone.
 
-use super::{FileError, Image, exr_codec};
-use crate::picture::{MAX_PIXELS, fail};
+use super::Image;
 
 /// Value of an attribute.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,17 +65,5 @@ impl<'i> ExrFile<'i> {
             let value = value.clone();
             self.add_channel(format!("{name}.{letter}"), move |pixel| value(pixel)[channel]);
         }
-    }
-
-    /// The bytes of the file.
-    ///
-    /// # Errors
-    /// A picture without pixels or with more than [`MAX_PIXELS`].
-    pub fn encode(self) -> Result<Vec<u8>, FileError> {
-        let Image { width, height, pixels } = self.image;
-        if pixels.is_empty() || pixels.len() > MAX_PIXELS {
-            fail!("{width}x{height} pixels cannot be written");
-        }
-        exr_codec::encode(self)
     }
 }

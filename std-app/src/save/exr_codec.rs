@@ -2,6 +2,7 @@
 
 use super::exr::{Attribute, ExrFile, Value};
 use super::{FileError, Image};
+use crate::picture::{MAX_PIXELS, fail};
 use exr::block::lines::LineRefMut;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::image::write::channels::{ChannelsWriter, WritableChannels};
@@ -21,8 +22,22 @@ const EXR: Encoding = Encoding {
     line_order: LineOrder::Increasing,
 };
 
+impl ExrFile<'_> {
+    /// The bytes of the file.
+    ///
+    /// # Errors
+    /// A picture without pixels or with more than [`MAX_PIXELS`].
+    pub fn encode(self) -> Result<Vec<u8>, FileError> {
+        let Image { width, height, pixels } = self.image;
+        if pixels.is_empty() || pixels.len() > MAX_PIXELS {
+            fail!("{width}x{height} pixels cannot be written");
+        }
+        encode(self)
+    }
+}
+
 /// The bytes of a file of at least one pixel.
-pub(super) fn encode(file: ExrFile) -> Result<Vec<u8>, FileError> {
+fn encode(file: ExrFile) -> Result<Vec<u8>, FileError> {
     let ExrFile { image, alpha, mut layers, attributes } = file;
     let Image { width, height, pixels } = image;
     let size = Vec2(*width as usize, *height as usize);

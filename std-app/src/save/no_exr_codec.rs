@@ -2,8 +2,17 @@
 
 use super::FileError;
 use super::exr::ExrFile;
+use crate::picture::fail;
 
-/// The error of a file.
-pub(super) fn encode(_: ExrFile) -> Result<Vec<u8>, FileError> {
-    Err(FileError::new("this program is built without feature `formats`, which writes .exr"))
+impl ExrFile<'_> {
+    /// The error of a library without feature `formats`.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn encode(self) -> Result<Vec<u8>, FileError> {
+        let [width, height] = [self.image.width, self.image.height];
+        fail!(
+            "{width}x{height} pixels cannot be written as .exr: this program is built without feature `formats`"
+        )
+    }
 }

@@ -10,6 +10,7 @@ mod fuzz;
 mod layers;
 mod limits;
 mod names;
+mod package;
 mod pages;
 mod python;
 mod quality;
@@ -37,6 +38,8 @@ enum When {
     Whole,
     /// The quick run; the full run has a step that includes this one.
     Quick,
+    /// None: it takes many minutes, and runs before a release.
+    Named,
     /// The run of the interfaces for other languages, which need compilers and browsers of their own.
     Bindings,
 }
@@ -77,6 +80,7 @@ const STEPS: &[Step] = &[
     step("web", "the module for browsers: bits, types, its page", bindings::web, When::Bindings),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
     step("python", "the wheel of the Python package passes its tests", python::check, When::Bindings),
+    step("package", "published crates: features, packages, oldest versions", package::check, When::Named),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
     step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),
 ];
