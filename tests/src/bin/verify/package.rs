@@ -25,7 +25,8 @@ pub(crate) fn check(project: &Project) -> Outcome {
     let crates = features(project)?;
     docs(project)?;
     let bytes = pack(project)?;
-    let unpacked = project.root.join("target/unpacked");
+    // Folders below the root would belong to its workspace.
+    let unpacked = std::env::temp_dir().join("halflight-packages");
     for (folder, is_tested) in [(unpacked.join("tested"), true), (unpacked.join("oldest"), false)] {
         let config = unpack(project, &folder)?;
         if is_tested { test(project, &folder, &config)? } else { oldest_versions(project, &folder, &config)? }
