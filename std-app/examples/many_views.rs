@@ -11,7 +11,7 @@ use std::time::Instant;
 const VIEWS: u32 = 50;
 
 fn main() -> Result<(), halflight::Error> {
-    let renderer = Renderer::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj"))?;
+    let renderer = Renderer::open(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell/cornell.obj"))?;
     let stop = Stop { spp: Some(4), ..Stop::default() };
     let method = Some(render::Method::Path);
     let settings = Settings { width: 64, height: 64, method, stop, ..Settings::default() };

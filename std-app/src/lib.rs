@@ -46,6 +46,10 @@
 //! }
 //! # Ok::<(), halflight::Error>(())
 //! ```
+//! # Features
+//!
+//! All are on by default: `cli`, the command line; `report`, pages and objects; `gltf`; `formats`, pictures
+//! in OpenEXR, TIFF and WebP; `sky`; `tev`, the viewer. A file is refused that needs a feature left out.
 #![forbid(unsafe_code)]
 
 // The command line names the library as other programs do.
@@ -53,6 +57,7 @@ extern crate self as halflight;
 
 pub mod bake;
 mod cgroup;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod compare;
 mod error;
@@ -63,13 +68,21 @@ pub mod memory;
 pub mod pages;
 pub mod picture;
 pub mod pool;
+mod provenance;
 pub mod quantity;
 pub mod render;
 mod renderer;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod save;
+#[cfg(feature = "sky")]
 pub mod sky;
+#[cfg(feature = "tev")]
+pub mod tev;
 pub mod values;
 
 pub use error::Error;
+// One line of a manifest is enough.
+pub use halflight_core::{self, Rgb};
+pub use provenance::Provenance;
 pub use renderer::{Camera, Renderer};

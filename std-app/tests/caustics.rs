@@ -15,7 +15,7 @@ fn a_lamp_in_glass_is_for_photons_by_any_seed() {
     let folder = Folder::new("bulb");
     std::fs::write(folder.path("room.obj"), ROOM).unwrap();
     std::fs::write(folder.path("room.mtl"), WALL).unwrap();
-    let sphere = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/shapes/sphere.obj");
+    let sphere = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/shapes/sphere.obj");
     let ball = |name: &str, scale: f32| {
         format!(
             "[[mesh]]\nfile = '{sphere}'\nscale = {scale}\ntranslate = [0.2, 2, 0]\nmaterial = '{name}'\n"

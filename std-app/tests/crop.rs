@@ -6,7 +6,7 @@ use halflight::load::{LoadOptions, load};
 use halflight::render::{self, Method, Reconstruct, RenderResult, Settings, Shard, Stop};
 use halflight_core::film::PixelWindow;
 
-const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell/cornell.obj");
 
 /// Width and height of the picture, and the corner and size of the window.
 const FRAME: [u32; 2] = [80, 64];

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell/cornell.obj");
 
 fn settings(renderer: &Renderer, [width, height]: [u32; 2], spp: u32) -> Settings {
     let layers = Some(Arc::new(LayerSettings::new(&Layer::ALL, &renderer.scene().triangle_objects)));

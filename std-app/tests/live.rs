@@ -112,7 +112,7 @@ fn tev_gets_the_bits_of_the_picture() {
 fn progress_as_objects_follows_its_schema() {
     let folder = Folder::new("progress");
     std::fs::write(folder.path("bad.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 9\n").unwrap();
-    let schema = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/progress.schema.json");
+    let schema = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/progress.schema.json");
     let schema: Value = serde_json::from_str(&std::fs::read_to_string(schema).unwrap()).unwrap();
     let mut kinds = std::collections::BTreeSet::new();
     for arguments in [

@@ -112,7 +112,7 @@ fn shards_merge_to_the_bits_of_one_render() {
 fn a_merged_picture_knows_what_its_samples_share() {
     let folder = Folder::new("shared");
     // Photons correlate the errors of distant pixels, also across shards.
-    let caustic = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/caustic/caustic.toml");
+    let caustic = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/caustic/caustic.toml");
     let render =
         |scene: &str, method: &str| format!("render {scene} --size 64x64 --spp 8 --method {method} --json");
     let cases = [
@@ -153,7 +153,7 @@ fn a_merged_picture_knows_what_its_samples_share() {
 #[test]
 fn caches_are_made_again_as_they_were() {
     let folder = Folder::new("caches");
-    let cornell = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell/cornell.obj");
+    let cornell = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.obj");
     let view = "--eye 278,273,-800 --look-at 278,273,279 --fov 37.5 --size 128x128";
     let method = "--method irradiance-cache --cache-rays 256 --audit off --json";
     let render = format!("render {} {view} {method}", cornell.display());

@@ -8,7 +8,7 @@ use halflight::render::{self, Ending, Method, Reconstruct, RenderResult, Setting
 use halflight_core::Rgb;
 use halflight_core::scene::{Material, PointLight};
 
-const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell/cornell.obj");
 
 fn settings(method: Method, spp: u32) -> Settings {
     let stop = Stop { spp: Some(spp), ..Stop::default() };

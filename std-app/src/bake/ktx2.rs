@@ -1,6 +1,5 @@
 //! KTX 2.0 files of one 3D texture of half floats, without mip levels or compression (Khronos 2021).
 
-use exr::prelude::f16;
 use halflight_core::Rgb;
 use std::io::{self, Write};
 
@@ -40,11 +39,29 @@ pub(super) fn write_volume(out: &mut dyn Write, size: [usize; 3], texels: &[Rgb]
     out.write_all(&vec![0; (TEXELS - INDEX - DESCRIPTION) as usize])?;
     for texel in texels {
         for channel in texel.extend(1.0).to_array() {
-            out.write_all(&f16::from_f32(channel.min(f16::MAX.to_f32())).to_le_bytes())?;
+            out.write_all(&half(channel).to_le_bytes())?;
         }
     }
     Ok(())
 }
+
+/// Bits of the half float next to `value`, which is at most the largest one.
+fn half(value: f32) -> u16 {
+    let sign = (value.to_bits() >> 16) as u16 & 0x8000;
+    let size = value.abs().min(LARGEST_HALF);
+    // A power of two, such that the sum has as many bits of mantissa below it as the half float.
+    let unit = f32::from_bits((size.to_bits() & 0x7f80_0000).max(SMALLEST_NORMAL.to_bits())) * 8192.0;
+    let rounded = size + unit - unit;
+    // The exponents of half floats are less by 112; subnormal ones are multiples of 2^-24.
+    let bits = match rounded < SMALLEST_NORMAL {
+        true => (rounded * 16_777_216.0) as u16,
+        false => ((rounded.to_bits() - (112 << 23)) >> 13) as u16,
+    };
+    sign | bits
+}
+
+const LARGEST_HALF: f32 = 65504.0;
+const SMALLEST_NORMAL: f32 = 6.103_515_6e-5;
 
 /// Writes the basic data format descriptor: linear RGBA of signed floats.
 fn describe(out: &mut dyn Write) -> io::Result<()> {
@@ -66,8 +83,18 @@ fn words(out: &mut dyn Write, words: &[u32]) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use exr::prelude::f16;
     use ktx2::dfd::Basic;
     use ktx2::{Format, Reader};
+
+    #[test]
+    fn half_floats_are_the_nearest() {
+        for bits in (0..0x4780_0000).step_by(997).chain((0..1 << 15).map(|half| half << 13 | 0x1000)) {
+            let value = f32::from_bits(bits);
+            let expected = f16::from_f32(value.min(LARGEST_HALF));
+            assert_eq!([half(value), half(-value)], [expected.to_bits(), (-expected).to_bits()], "{value}");
+        }
+    }
 
     #[test]
     fn a_reader_of_the_format_finds_all_texels() {

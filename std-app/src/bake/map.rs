@@ -1,8 +1,6 @@
 //! Texels of a lightmap and their files: EXR with coverage, HDR, PFM.
 
-use crate::save::{self, EXR, FileError, Format, Image, exr_bytes};
-use exr::image::SpecificChannels;
-use exr::math::Vec2;
+use crate::save::{self, ExrFile, FileError, Format, Image};
 
 /// Values of a texel in all layers; the first alone, or the constant and the gradient along x, y and z.
 pub(super) type Fetch = [[f32; 3]; 4];
@@ -109,18 +107,13 @@ impl LightMap {
 
     /// R, G, B, and coverage as A: 1 for computed texels, ½ for filled ones.
     fn encode_exr(&self, image: &Image) -> Result<Vec<u8>, FileError> {
-        let size = Vec2(image.width as usize, image.height as usize);
-        let pixel = |at: Vec2<usize>| {
-            let place = at.y() * size.x() + at.x();
-            let [r, g, b] = image.pixels[place];
-            let coverage = match self.texels[place % self.texels.len()] {
-                Texel::Empty => 0.0,
-                Texel::Filled => 0.5,
-                Texel::Computed => 1.0,
-            };
-            (r, g, b, coverage)
-        };
-        exr_bytes(&exr::image::Image::from_encoded_channels(size, EXR, SpecificChannels::rgba(pixel)))
+        let mut file = ExrFile::of(image);
+        file.set_alpha(|place| match self.texels[place % self.texels.len()] {
+            Texel::Empty => 0.0,
+            Texel::Filled => 0.5,
+            Texel::Computed => 1.0,
+        });
+        file.encode()
     }
 }
 

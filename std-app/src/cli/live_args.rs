@@ -5,24 +5,16 @@ use super::outputs::{Outputs, Role};
 use super::stdio::print_note;
 use super::values;
 use super::view_args::ViewArgs;
+use super::viewer::Viewer;
 use clap::Args;
-use core::time::Duration;
 use halflight::render::Progress;
 use halflight::save::{self, Destination, Format, Image, Patience};
 use std::borrow::Cow;
-use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 /// Seconds between two previews.
 const EVERY: f64 = 5.0;
-
-/// Longest wait for a viewer.
-const WAIT: Duration = Duration::from_secs(2);
-
-/// Name of the picture in the viewer.
-const NAME: &str = "halflight";
 
 #[derive(Args)]
 pub(super) struct LiveArgs {
@@ -56,7 +48,7 @@ impl LiveArgs {
     /// The picture in progress, as PNG files in this `view`.
     pub(super) fn live<'a>(&'a self, view: &'a ViewArgs) -> LivePicture<'a> {
         let viewer = self.tev.as_deref().and_then(|address| {
-            let connected = connected(address);
+            let connected = Viewer::connect(address);
             connected.map_err(|error| print_note(no_viewer(address, &error))).ok()
         });
         LivePicture {
@@ -69,14 +61,6 @@ impl LiveArgs {
     }
 }
 
-fn connected(address: &str) -> std::io::Result<TevClient> {
-    let unknown = || std::io::Error::other("it is no address");
-    let address = address.to_socket_addrs()?.next().ok_or_else(unknown)?;
-    let stream = TcpStream::connect_timeout(&address, WAIT)?;
-    stream.set_write_timeout(Some(WAIT))?;
-    Ok(TevClient::wrap(stream))
-}
-
 fn no_viewer(address: &str, error: &dyn core::fmt::Display) -> String {
     format!("tev at {address} shows nothing ({error}): start it before the render, or name its address")
 }
@@ -85,7 +69,7 @@ fn no_viewer(address: &str, error: &dyn core::fmt::Display) -> String {
 pub(super) struct LivePicture<'a> {
     preview: Option<&'a Path>,
     view: &'a ViewArgs,
-    viewer: Option<TevClient>,
+    viewer: Option<Viewer>,
     every: f64,
     /// Time of the last state.
     shown: Option<Instant>,
@@ -107,7 +91,7 @@ impl LivePicture<'_> {
 
     /// Shows the picture.
     pub(super) fn put(&mut self, image: &Image) {
-        let is_first = self.shown.replace(Instant::now()).is_none();
+        self.shown = Some(Instant::now());
         if let Some(file) = self.preview {
             let is_linear = Format::of(file).is_ok_and(Format::is_linear);
             let shown = if is_linear { Cow::Borrowed(image) } else { self.view.of(image) };
@@ -117,37 +101,10 @@ impl LivePicture<'_> {
             }
         }
         if let Some(viewer) = &mut self.viewer
-            && let Err(error) = send(viewer, image, is_first)
+            && let Err(error) = viewer.show(image)
         {
             print_note(format_args!("tev has gone ({error}); the render continues"));
             self.viewer = None;
         }
     }
-}
-
-/// Sends a picture to the viewer, whose first packet makes it.
-fn send(viewer: &mut TevClient, image: &Image, is_first: bool) -> std::io::Result<()> {
-    let Image { width, height, ref pixels } = *image;
-    let channel_names = &["R", "G", "B"];
-    if is_first {
-        viewer.send(PacketCreateImage {
-            image_name: NAME,
-            grab_focus: true,
-            width,
-            height,
-            channel_names,
-        })?;
-    }
-    viewer.send(PacketUpdateImage {
-        image_name: NAME,
-        grab_focus: false,
-        channel_names,
-        channel_offsets: &[0, 1, 2],
-        channel_strides: &[3, 3, 3],
-        x: 0,
-        y: 0,
-        width,
-        height,
-        data: bytemuck::cast_slice(pixels),
-    })
 }

@@ -25,6 +25,8 @@ mod stdio;
 mod summary;
 mod values;
 mod view_args;
+#[cfg_attr(not(feature = "tev"), path = "no_viewer.rs")]
+mod viewer;
 
 pub use keywords::{Keywords, Refused};
 

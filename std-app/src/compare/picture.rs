@@ -3,10 +3,10 @@
 use super::heat::{heat, signed};
 use super::{Comparison, Image};
 use crate::save::from_srgb;
-use clap::ValueEnum;
 
 /// Content of a picture of the difference between A and its reference B.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Shown {
     /// A - B; as .png blue is too dark, red is too bright
     Signed,
@@ -20,8 +20,13 @@ pub enum Shown {
 
 impl Shown {
     /// Its name in flags and results.
-    pub fn name(self) -> String {
-        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    pub fn name(self) -> &'static str {
+        match self {
+            Shown::Signed => "signed",
+            Shown::Absolute => "absolute",
+            Shown::Relative => "relative",
+            Shown::Flip => "flip",
+        }
     }
 
     /// True if values may be negative.

@@ -1,7 +1,7 @@
 //! Facts of a render as attributes of an OpenEXR file.
 
+use crate::provenance::Provenance;
 use crate::render::{ErrorEstimate, Merged, RenderResult, Settings};
-use crate::report::Provenance;
 use crate::save::{Attribute, ExrFile};
 use halflight_core::findings::{Decision, Findings};
 

@@ -6,18 +6,8 @@ use std::sync::Arc;
 /// A range of shared bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Bytes {
-    of: Arc<Vec<u8>>,
-    range: Range<usize>,
-}
-
-impl Bytes {
-    /// A part; `None` if it does not lie in these bytes.
-    pub(in crate::load) fn part(&self, offset: u64, length: u64) -> Option<Self> {
-        let start = usize::try_from(offset).ok()?;
-        let end = start.checked_add(usize::try_from(length).ok()?)?;
-        let within = end <= self.range.len();
-        within.then(|| Self { of: self.of.clone(), range: self.range.start + start..self.range.start + end })
-    }
+    pub(super) of: Arc<Vec<u8>>,
+    pub(super) range: Range<usize>,
 }
 
 impl From<Vec<u8>> for Bytes {

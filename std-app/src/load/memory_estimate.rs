@@ -27,10 +27,6 @@ const NOTE: usize = 300;
 const MATERIAL: usize = 4096;
 /// Bytes per byte of a scene file; values of two characters need most.
 const SCENE_FILE: usize = 220;
-/// Bytes per object of a glTF file, in a list that grows.
-const GLTF_OBJECT: usize = 1500;
-/// Bytes per entry of a list of a glTF file.
-const GLTF_ENTRY: usize = 40;
 /// Bytes per piece of a cut triangle: four corners, and two triangles that may emit.
 const PIECE: usize = 860;
 
@@ -117,13 +113,6 @@ pub(super) fn of_mtl(text: &[u8]) -> usize {
 /// Upper bound of the bytes that a scene file takes.
 pub(super) fn of_scene_file(text: &[u8]) -> usize {
     text.len().saturating_mul(SCENE_FILE)
-}
-
-/// Upper bound of the bytes that the objects of a glTF file take: a brace begins an object, a comma ends a
-/// number or a string.
-pub(super) fn of_gltf(json: &[u8]) -> usize {
-    let count = |wanted: u8| json.iter().filter(|&&byte| byte == wanted).count();
-    (2 * json.len()).saturating_add(GLTF_OBJECT * count(b'{') + GLTF_ENTRY * count(b','))
 }
 
 /// Bytes of a mesh.

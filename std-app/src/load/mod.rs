@@ -15,12 +15,14 @@ mod far_camera;
 mod files;
 mod fit;
 mod geometry;
+#[cfg(feature = "gltf")]
 pub mod gltf;
 mod illum;
 mod instances;
 mod library;
 mod map;
 mod memory_estimate;
+#[cfg_attr(not(feature = "gltf"), path = "no_models.rs")]
 mod models;
 pub mod mtl;
 mod name;
@@ -45,6 +47,7 @@ mod touching_glass;
 mod transform;
 
 pub use error::LoadError;
+pub use halflight_core::scene::{Material, PointLight};
 pub use instances::LoadedInstances;
 pub use map::{Channel, Map, MapOptions};
 pub use name::Name;
@@ -56,9 +59,7 @@ pub use transform::{SceneTransform, direction};
 
 use crate::memory::{self, Budget, Shortage};
 use files::Lookup;
-use halflight_core::scene::Material;
 use library::{Library, Sources};
-use models::ReadModel;
 use mtl::MtlMaterial;
 use name::readings;
 use placed::{PlacedMesh, Placement};
@@ -148,7 +149,8 @@ struct SceneBuilder {
     overrides: BTreeMap<String, MaterialChange>,
     used_overrides: BTreeSet<String>,
     /// glTF files that are read.
-    models: HashMap<PathBuf, Rc<ReadModel>>,
+    #[cfg(feature = "gltf")]
+    models: HashMap<PathBuf, Rc<models::ReadModel>>,
     /// Pictures in glTF files, and the bytes of those files.
     embedded: Embedded,
     held: usize,
@@ -172,6 +174,7 @@ impl SceneBuilder {
             material_numbers: HashMap::new(),
             overrides: BTreeMap::new(),
             used_overrides: BTreeSet::new(),
+            #[cfg(feature = "gltf")]
             models: HashMap::new(),
             embedded: HashMap::new(),
             held: 0,

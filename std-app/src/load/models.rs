@@ -6,7 +6,8 @@ use super::placed_light::PlacedLight;
 use super::scene::{NamedCamera, View, ViewKind};
 use super::{LoadError, MORE_MEMORY, SceneBuilder, obj, too_large};
 use crate::memory;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use halflight_core::scene::PointLight;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -83,6 +84,24 @@ impl SceneBuilder {
             lights: model.lights,
             cameras: model.cameras,
         })
+    }
+}
+
+impl PlacedLight {
+    /// The light of a file that is placed in the scene.
+    fn placed(mut self, placement: &Placement) -> Self {
+        self.position = placement.point(self.position);
+        let turned = |direction: Vec3| {
+            let turned = (placement.linear * direction.as_dvec3()).try_normalize();
+            turned.map_or(direction, DVec3::as_vec3)
+        };
+        match &mut self.light {
+            PointLight::Spot { direction, .. } | PointLight::Directional { direction, .. } => {
+                *direction = turned(*direction);
+            }
+            PointLight::Point { .. } => {}
+        }
+        self
     }
 }
 

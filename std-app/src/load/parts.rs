@@ -34,10 +34,8 @@ pub struct PartMesh<'a> {
 /// normals and triangles, and notes what it changes.
 ///
 /// ```
-/// use halflight::load::{PartMesh, SceneParts, View};
-/// use halflight::Renderer;
-/// use halflight_core::Rgb;
-/// use halflight_core::scene::{Material, PointLight};
+/// use halflight::load::{Material, PartMesh, PointLight, SceneParts, View};
+/// use halflight::{Renderer, Rgb};
 ///
 /// let mut parts = SceneParts::default();
 /// let white = parts.material("white", Material::diffuse(Rgb::splat(0.7)));

@@ -1,10 +1,8 @@
 //! Lights without surface in the coordinates of files, and their move to those of the core.
 
 use super::notes::Notes;
-use super::placed::Placement;
 use super::scene_file::BRIGHTEST;
 use super::transform::SceneTransform;
-use glam::DVec3;
 use halflight_core::scene::PointLight;
 
 /// A light in f64: `light` has its direction and cone.
@@ -28,22 +26,6 @@ impl PlacedLight {
         };
         let [position, power] = [position.to_array(), power.to_array()].map(|vector| vector.map(f64::from));
         Self { position, power, light }
-    }
-
-    /// The light of a file that is placed in the scene.
-    pub(super) fn placed(mut self, placement: &Placement) -> Self {
-        self.position = placement.point(self.position);
-        let turned = |direction: glam::Vec3| {
-            let turned = (placement.linear * direction.as_dvec3()).try_normalize();
-            turned.map_or(direction, DVec3::as_vec3)
-        };
-        match &mut self.light {
-            PointLight::Spot { direction, .. } | PointLight::Directional { direction, .. } => {
-                *direction = turned(*direction);
-            }
-            PointLight::Point { .. } => {}
-        }
-        self
     }
 
     /// The light in the coordinates of the core; too bright ones are limited, those beyond f32 left out.

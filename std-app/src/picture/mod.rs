@@ -3,15 +3,20 @@
 //! The content determines the format (the name only for TGA). The header gives the memory that decoding
 //! takes, which is compared with the limit before anything is decoded.
 
+#[cfg(feature = "formats")]
 mod exr;
 mod hdr;
 mod jpeg;
 mod kind;
+#[cfg(feature = "formats")]
 mod layers;
+#[cfg(not(feature = "formats"))]
+mod no_formats;
 mod pfm;
 mod primaries;
 mod raster;
 mod rgbe;
+#[cfg(feature = "formats")]
 mod tiff;
 
 pub use crate::file_error::FileError;
@@ -19,6 +24,8 @@ pub(crate) use crate::file_error::fail;
 pub use kind::Kind;
 
 use crate::quantity::readable_bytes;
+#[cfg(not(feature = "formats"))]
+use no_formats::{exr, tiff};
 use std::path::Path;
 
 /// Most pixels of a picture, 16384².

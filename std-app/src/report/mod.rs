@@ -8,16 +8,15 @@ mod folder;
 mod json;
 mod layers;
 mod page;
-mod provenance;
 mod race;
 
 pub use census::counts;
 pub use folder::{check_folder, report_files, write_folder};
 pub use json::{comparison_object, dropped_object, error_object, file_name, findings_object, left_out_array};
-pub use provenance::Provenance;
 pub use race::{Race, RaceEntry};
 
 use crate::compare::Comparison;
+pub use crate::provenance::Provenance;
 use crate::render::{RenderResult, Settings};
 use crate::save::Image;
 use halflight_core::census::Census;

@@ -1,19 +1,14 @@
 /* Irradiance of a floor, each value with its 95 % interval. */
 #include "room.h"
 #include <stdio.h>
-#include <stdlib.h>
 
 int main(void) {
-    HalflightMaterial materials[2];
-    HalflightSceneDescription description = room(materials);
-    size_t bytes = halflight_scene_memory(&description);
-    void *scene_memory = malloc(bytes);
-    HalflightScene *scene;
-    if (halflight_scene_new(&description, scene_memory, bytes, &scene) != HALFLIGHT_STATUS_OK) return 1;
+    void *scene_memory;
+    HalflightScene *scene = new_room(&scene_memory);
 
     HalflightPoint points[3] = {{{0, 0, 0}, {0, 1, 0}}, {{1, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {0, -1, 0}}};
     HalflightIrradiance values[3];
-    bytes = halflight_irradiance_memory(scene, 3, 1);
+    size_t bytes = halflight_irradiance_memory(scene, 3, 1);
     void *memory = malloc(bytes);
     HalflightIrradianceRenderer *renderer;
     HalflightStatus status = halflight_irradiance_new(scene, points, 3, NULL, NULL, memory, bytes, &renderer);

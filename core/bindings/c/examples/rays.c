@@ -8,7 +8,7 @@ int main(void) {
     const struct { float position[3]; unsigned color; } vertices[4] = {
         {{-1, 0, -1}, 0}, {{-1, 0, 1}, 0}, {{1, 0, 1}, 0}, {{1, 0, -1}, 0}};
     const uint32_t triangles[6] = {0, 1, 2, 0, 2, 3};
-    HalflightMesh mesh = {0};
+    static HalflightMesh mesh;
     mesh.positions = vertices[0].position;
     mesh.position_stride = sizeof vertices[0];
     mesh.vertices = 4;

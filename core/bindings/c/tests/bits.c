@@ -1,7 +1,6 @@
 /* Fingerprints of a picture by each method and of irradiances, at the baseline level: those of every target. */
 #include "../examples/room.h"
 #include <stdio.h>
-#include <stdlib.h>
 
 static uint64_t fingerprint(const void *values, size_t bytes) {
     uint64_t hash = 0xcbf29ce484222325u;
@@ -10,14 +9,11 @@ static uint64_t fingerprint(const void *values, size_t bytes) {
 }
 
 int main(void) {
-    HalflightMaterial materials[2];
-    HalflightSceneDescription description = room(materials);
-    description.camera.lens_radius = 0;
-    size_t bytes = halflight_scene_memory(&description);
-    void *scene_memory = malloc(bytes);
-    HalflightScene *scene;
-    if (halflight_scene_new(&description, scene_memory, bytes, &scene) != HALFLIGHT_STATUS_OK) return 1;
-    HalflightSettings settings = {0};
+    void *scene_memory;
+    HalflightScene *scene = new_room(&scene_memory);
+    if (!scene) return 1;
+    size_t bytes;
+    static HalflightSettings settings;
     settings.width = 32;
     settings.height = 24;
     settings.precise = true;
@@ -34,7 +30,7 @@ int main(void) {
         free(memory);
     }
     HalflightPoint points[3] = {{{0, 0, 0}, {0, 1, 0}}, {{1, 0, 0}, {0, 1, 0}}, {{0, 1, 0}, {1, 0, 0}}};
-    HalflightPointSettings of_points = {0};
+    static HalflightPointSettings of_points;
     of_points.precise = true;
     HalflightIrradiance values[3];
     bytes = halflight_irradiance_memory(scene, 3, 1);

@@ -12,6 +12,16 @@ const MAGIC: &[u8] = b"glTF";
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
 const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 
+impl Bytes {
+    /// A part; `None` if it does not lie in these bytes.
+    pub(super) fn part(&self, offset: u64, length: u64) -> Option<Self> {
+        let start = usize::try_from(offset).ok()?;
+        let end = start.checked_add(usize::try_from(length).ok()?)?;
+        let within = end <= self.range.len();
+        within.then(|| Self { of: self.of.clone(), range: self.range.start + start..self.range.start + end })
+    }
+}
+
 /// The JSON of a file, and its binary chunk.
 pub(super) fn chunks(file: &Path, bytes: Bytes) -> Result<(Bytes, Option<Bytes>), LoadError> {
     if !bytes.starts_with(MAGIC) {
@@ -48,6 +58,19 @@ pub(super) fn chunks(file: &Path, bytes: Bytes) -> Result<(Bytes, Option<Bytes>)
     let [json, binary] = parts;
     let problem = "this GLB has no JSON chunk";
     Ok((json.ok_or_else(|| LoadError::of_file(file, problem, "export it again"))?, binary))
+}
+
+/// Bytes per object, in a list that grows.
+const OBJECT: usize = 1500;
+
+/// Bytes per entry of a list.
+const ENTRY: usize = 40;
+
+/// Upper bound of the bytes that the objects of a glTF file take: a brace begins an object, a comma ends a
+/// number or a string.
+pub(super) fn memory_of(json: &[u8]) -> usize {
+    let count = |wanted: u8| json.iter().filter(|&&byte| byte == wanted).count();
+    (2 * json.len()).saturating_add(OBJECT * count(b'{') + ENTRY * count(b','))
 }
 
 /// Parses the JSON.

@@ -75,7 +75,7 @@ pub(super) fn read(
 ) -> Result<Model, LoadError> {
     let mut source = Source { file, lookup, budget, held: 0, notes: Notes::of(file.display().to_string()) };
     let (json, binary) = container::chunks(file, bytes.into())?;
-    let of_json = super::memory_estimate::of_gltf(&json);
+    let of_json = container::memory_of(&json);
     source.take(of_json)?;
     let document = container::document(file, &json)?;
     drop(json);

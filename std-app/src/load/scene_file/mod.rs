@@ -6,6 +6,7 @@ mod camera;
 mod light;
 mod material;
 mod placement;
+#[cfg_attr(not(feature = "sky"), path = "no_sky.rs")]
 mod sky;
 mod values;
 

@@ -12,7 +12,7 @@ const SIZE: u32 = 64;
 const WRONG: Method = Method::ClampedInstantRadiosity;
 
 fn picture(settings: Settings) -> RenderResult {
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell/cornell.obj");
     let loaded = load(scene.as_ref(), &LoadOptions::default()).unwrap();
     let views = loaded.views();
     let scene = views.scene(loaded.camera_or_default());

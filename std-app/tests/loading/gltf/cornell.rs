@@ -53,7 +53,7 @@ fn gltf(obj: &Obj, materials: &[MtlMaterial]) -> Gltf {
 
 #[test]
 fn glb_of_the_cornell_box_has_the_buffers_of_the_obj() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell");
     let text = rounded(&std::fs::read_to_string(folder.join("cornell.obj")).unwrap());
     let library = std::fs::read(folder.join("cornell.mtl")).unwrap();
     let obj = obj::parse(text.clone().into_bytes(), Path::new("cornell.obj")).unwrap();

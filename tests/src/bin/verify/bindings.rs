@@ -4,6 +4,8 @@ use crate::command::{command, exists, output, run};
 use crate::targets::cross_cargo;
 use crate::{Failure, Outcome, Project};
 use std::fs;
+use std::path::Path;
+use std::process::Command;
 
 /// Triple of WebAssembly.
 const WEB: &str = "wasm32-unknown-unknown";
@@ -19,7 +21,25 @@ pub(crate) fn c(project: &Project) -> Outcome {
     {
         run(command(&folder, line).env("CARGO_TARGET_DIR", project.root.join("target")))?;
     }
-    Ok("header, programs in C and C++".to_owned())
+    Ok(format!("header, programs in C and C++, {}", installed(project, &folder)?))
+}
+
+/// Installs the library into an empty prefix, and runs a program that is compiled by its file for pkg-config.
+fn installed(project: &Project, folder: &Path) -> Outcome {
+    if !exists("cargo-cinstall") || !exists("pkg-config") {
+        return Ok("not installed: cargo install cargo-c".to_owned());
+    }
+    let prefix = project.root.join("target/prefix");
+    let _ = fs::remove_dir_all(&prefix);
+    let mut cargo = command(folder, "cargo cinstall --profile quick --locked --quiet --libdir lib --prefix");
+    run(cargo.arg(&prefix).env("CARGO_TARGET_DIR", project.root.join("target/cinstall")))?;
+    let mut config = command(folder, "pkg-config --cflags --libs halflight");
+    let flags = output(config.env("PKG_CONFIG_PATH", prefix.join("lib/pkgconfig")))?;
+    let program = prefix.join("rays");
+    let line = "cc -std=c99 -Wall -Wextra -Werror examples/rays.c -o";
+    run(command(folder, line).arg(&program).args(flags.split_whitespace()))?;
+    run(Command::new(&program).env("LD_LIBRARY_PATH", prefix.join("lib")))?;
+    Ok("installed by cargo-c".to_owned())
 }
 
 /// Packages that check the types of the module and bundle its page.

@@ -11,6 +11,7 @@ mod fuzz;
 mod layers;
 mod limits;
 mod names;
+mod package;
 mod pages;
 mod python;
 mod quality;
@@ -38,10 +39,10 @@ enum When {
     Whole,
     /// The quick run; the full run has a step that includes this one.
     Quick,
+    /// None: named alone, since it needs other programs or takes many minutes.
+    Named,
     /// The run of the interfaces for other languages, which need compilers and browsers of their own.
     Bindings,
-    /// None: named alone, since it needs schedulers.
-    Cluster,
 }
 
 /// The name of all quick steps.
@@ -80,7 +81,8 @@ const STEPS: &[Step] = &[
     step("web", "the module for browsers: bits, types, its page", bindings::web, When::Bindings),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
     step("python", "the wheel of the Python package passes its tests", python::check, When::Bindings),
-    step("cluster", "parts under Slurm and others: bits of one run", cluster::check, When::Cluster),
+    step("cluster", "parts under Slurm and others: bits of one run", cluster::check, When::Named),
+    step("package", "published crates: features, packages, oldest versions", package::check, When::Named),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
     step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),
 ];

@@ -1,6 +1,5 @@
 //! Provenance of a picture: command, program, machine and date.
 
-use core::fmt::Write;
 use std::env::consts::{ARCH, OS};
 use std::time::SystemTime;
 
@@ -50,10 +49,18 @@ fn processor() -> Option<String> {
 
 /// Date as `2000-02-29 00:00 UTC`, 1970 for earlier times.
 fn date(time: SystemTime) -> String {
-    let mut stamp = String::new();
-    // Fails after the year 9999.
-    let _ = write!(stamp, "{}", humantime::format_rfc3339_seconds(time.max(SystemTime::UNIX_EPOCH)));
-    format!("{} UTC", stamp.get(..16).unwrap_or_default().replace('T', " "))
+    let minutes = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |past| past.as_secs() / 60);
+    let (hours, minute) = (minutes / 60, minutes % 60);
+    // Days since 0000-03-01: the leap day ends a year, and 146097 days are 400 years.
+    let (day, hour) = (hours / 24 + 719_468, hours % 24);
+    let day_of_era = day % 146_097;
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    // Five months from March have 153 days.
+    let month = (5 * day_of_year + 2) / 153;
+    let day_of_month = day_of_year - (153 * month + 2) / 5 + 1;
+    let year = day / 146_097 * 400 + year_of_era + u64::from(month >= 10);
+    format!("{year:04}-{:02}-{day_of_month:02} {hour:02}:{minute:02} UTC", (month + 2) % 12 + 1)
 }
 
 #[cfg(test)]
@@ -67,6 +74,7 @@ mod tests {
             (0, "1970-01-01 00:00 UTC"),
             (951_782_399, "2000-02-28 23:59 UTC"),
             (951_782_400, "2000-02-29 00:00 UTC"),
+            (1_735_689_599, "2024-12-31 23:59 UTC"),
             (4_107_542_400, "2100-03-01 00:00 UTC"),
         ] {
             assert_eq!(date(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)), expected);

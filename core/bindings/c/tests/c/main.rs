@@ -1,11 +1,16 @@
 //! Programs in C and C++ that use the library by its header: they compile without a warning, print right
-//! values, and pass valgrind where that is installed.
+//! values, and pass sanitizers, and valgrind where that is installed.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The programs and the lines that they print.
+mod abi;
+mod manual;
+
+const EXAMPLES: [&str; 5] = ["rays", "nearest", "irradiance", "picture", "threads"];
+
+/// The programs with known lines, and these lines.
 const PROGRAMS: [(&str, &[&str]); 2] = [
     (
         "rays",
@@ -69,15 +74,36 @@ fn lines_of(command: &mut Command) -> Vec<String> {
 }
 
 const C: [&str; 2] = ["cc", "-std=c99"];
-const CPP: [&str; 5] = ["c++", "-std=c++20", "-Wno-missing-field-initializers", "-x", "c++"];
+
+/// Compilers of both languages; those that are not installed are left out.
+const COMPILERS: [&[&str]; 4] = [
+    &C,
+    &["c++", "-std=c++20", "-x", "c++"],
+    &["clang", "-std=c99"],
+    &["clang++", "-std=c++20", "-x", "c++"],
+];
+
+fn is_installed(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok()
+}
 
 #[test]
 fn programs_print_right_values_in_c_and_cpp_with_both_libraries() {
     for (name, expected) in PROGRAMS {
-        for (compiler, shared) in [(&C[..], false), (&C[..], true), (&CPP[..], false)] {
-            let lines = lines_of(&mut Command::new(compiled(name, compiler, shared)));
-            assert_eq!(lines, expected, "{compiler:?}");
+        for compiler in COMPILERS.into_iter().filter(|compiler| is_installed(compiler[0])) {
+            for shared in [false, true] {
+                let lines = lines_of(&mut Command::new(compiled(name, compiler, shared)));
+                assert_eq!(lines, expected, "{compiler:?}");
+            }
         }
+    }
+}
+
+#[test]
+fn examples_are_short() {
+    for name in EXAMPLES {
+        let lines = read(&folder().join("examples").join(format!("{name}.c"))).lines().count();
+        assert!((1..=40).contains(&lines), "{name}: {lines} lines");
     }
 }
 
@@ -131,12 +157,17 @@ fn each_method_renders_in_one_buffer_until_its_error_is_small() {
 #[test]
 fn threads_of_the_program_give_the_same_bits() {
     let lines = lines_of(&mut Command::new(compiled("threads", &C, true)));
-    assert!(lines[0].ends_with("same bits on 4 threads"), "{lines:?}");
+    assert_eq!(lines, ["same bits on 4 threads"]);
 }
 
 #[test]
 fn no_program_touches_memory_that_is_not_its_own() {
-    if Command::new("valgrind").arg("--version").output().is_err() {
+    for name in EXAMPLES {
+        let sanitized =
+            [&C[..], &["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]].concat();
+        lines_of(&mut Command::new(compiled(name, &sanitized, false)));
+    }
+    if !is_installed("valgrind") {
         println!("skipped: valgrind is not installed");
         return;
     }
@@ -153,11 +184,16 @@ fn the_header_is_that_of_the_source() {
     let mut header = Vec::new();
     cbindgen::Builder::new().with_crate(folder()).with_config(config).generate().unwrap().write(&mut header);
     let header = String::from_utf8(header).unwrap().replace("// # Safety\n", "// Requires:\n");
-    let path = folder().join("include/halflight.h");
+    assert_file("include/halflight.h", &header);
+}
+
+/// Asserts that a file has this text, or writes it.
+fn assert_file(name: &str, text: &str) {
+    let path = folder().join(name);
     if std::env::var("SNAPSHOT").is_ok_and(|write| write == "write") {
-        std::fs::write(&path, &header).unwrap();
+        std::fs::write(&path, text).unwrap();
     }
-    assert!(header == read(&path), "SNAPSHOT=write cargo test writes the header anew");
+    assert!(text == read(&path), "{name} is out of date: SNAPSHOT=write cargo test writes it anew");
 }
 
 fn read(path: &Path) -> String {

@@ -1,0 +1,3 @@
+//! The viewer of `--tev`.
+
+pub(super) use halflight::tev::Viewer;
