@@ -94,8 +94,8 @@ impl LightmapError {
         match self {
             Self::Subject(_, names) => format!("the names are all, {}", names.join(", ")),
             Self::Charts(_) | Self::Overlaps(..) => {
-                "unwrap the mesh into one square without overlaps, as by \
-                 Lightmap Pack of Blender or by xatlas, or choose a mesh, an object or a material by --lightmap NAME"
+                "unwrap the mesh into one square without overlaps, as by smart_project of Blender (the command is in \
+                 docs/bake.md) or by xatlas, or choose a mesh, an object or a material by --lightmap NAME"
                     .into()
             }
             Self::Texels => "lower --size".into(),

@@ -233,7 +233,12 @@ impl Bake {
         };
         let baked = bake::irradiance(&scene, points, &settings, &mut progress, &INTERRUPT);
         reporter.end();
-        baked.map_err(|error| render_failure(&self.scene, &error))
+        let baked = baked.map_err(|error| render_failure(&self.scene, &error))?;
+        let missing = baked.values.iter().filter(|value| value.samples == 0).count();
+        if missing > 0 && !self.parts.is_part() {
+            print_note(format!("{missing} points have no samples yet: their values are 0"));
+        }
+        Ok(baked)
     }
 
     /// True if an output has the fractions of back faces.
