@@ -65,7 +65,7 @@ impl<'a> Raster<'a> {
                 unwatched -= 1;
                 if unwatched == 0 {
                     unwatched = WATCHED;
-                    is_wanted &= watch(f64::from(number) / triangles.len() as f64);
+                    is_wanted = is_wanted && watch(f64::from(number) / triangles.len() as f64);
                 }
                 if !is_wanted {
                     return;
