@@ -123,7 +123,7 @@ fn probes((size, cubes): ([u32; 3], bool), numbers: &[u8], points: usize) -> Opt
 
 /// Numbers of bytes that may begin at any address.
 fn numbers_of<T: bytemuck::Pod>(bytes: &[u8]) -> Option<Vec<T>> {
-    let is_whole = bytes.len() % size_of::<T>() == 0;
+    let is_whole = bytes.len().is_multiple_of(size_of::<T>());
     is_whole.then(|| bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
 }
 
