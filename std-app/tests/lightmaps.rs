@@ -314,3 +314,44 @@ fn an_object_has_a_map_of_its_own() {
     let [shelf, ground] = ["shelf", "ground"].map(red);
     assert!(shelf > 0.3 && ground == 0.0, "{shelf} {ground}");
 }
+
+#[test]
+fn a_map_in_parts_has_the_bits_of_one() {
+    let folder = furnace("lightmap-parts");
+    let bake = "bake scene.obj --lightmap all --size 24x16 --unit white --directional --json";
+    let whole =
+        folder.object(&format!("{bake} --spp 24 -o whole.exr --error-map whole-error.exr --threads 1"));
+    for shard in 1..=3 {
+        folder.object(&format!("{bake} --spp 24 --shard {shard}/3 --checkpoint {shard}.bake"));
+    }
+    let merged =
+        folder.object("merge 3.bake 1.bake 2.bake -o merged.exr --error-map merged-error.exr --json");
+    assert_eq!((&merged["texels"], &merged["charts"]), (&whole["texels"], &6.into()));
+    // A bake that ended early goes on.
+    for spp in [5, 24] {
+        folder.object(&format!("{bake} --spp {spp} --continue a.bake -o a.exr --error-map a-error.exr"));
+    }
+    let bytes = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    for name in ["merged", "a"] {
+        assert!(bytes(&format!("{name}.exr")) == bytes("whole.exr"), "{name}");
+        assert!(bytes(&format!("{name}-error.exr")) == bytes("whole-error.exr"), "{name}");
+    }
+    for (arguments, reason) in [
+        ("merge 1.bake 2.bake 3.bake -o no.csv", "no.csv"),
+        ("merge 1.bake 2.bake 3.bake -o no.hdr", "an HDR has no negative values"),
+        ("merge 1.bake 2.bake 3.bake -o 1.bake", "1.bake"),
+        ("merge 1.bake 3.bake -o no.exr", "shard 2/3 is missing"),
+        (
+            "bake scene.obj --lightmap all --size 24x16 --spp 24 --continue a.bake -o no.exr",
+            "a.bake: is a bake of points 1536",
+        ),
+        (
+            "bake scene.obj --lightmap all --size 24x16 --method auto --continue b.bake -o no.exr",
+            "cannot be used with",
+        ),
+    ] {
+        let said = folder.refused(arguments);
+        assert!(said.contains(reason), "{arguments}: {said}");
+    }
+    assert!(!folder.path("no.exr").exists() && !folder.path("no.csv").exists());
+}

@@ -118,3 +118,38 @@ fn bad_grids_are_refused_before_the_work() {
         assert!(said.contains(message), "{arguments}: {said}");
     }
 }
+
+#[test]
+fn probes_in_parts_have_the_bits_of_one() {
+    let folder = furnace("probes-parts");
+    let bake = "bake scene.obj --probes 3x4x3 --spp 24 --json";
+    folder.object(&format!("{bake} -o whole.json -o whole.csv -o whole.ktx2 --threads 1"));
+    for shard in 1..=3 {
+        folder.object(&format!("{bake} --shard {shard}/3 --checkpoint {shard}.bake"));
+    }
+    let merged = folder.object("merge 3.bake 1.bake 2.bake -o m.json -o m.csv -o m.ktx2 --json");
+    assert_eq!(merged["probes"], serde_json::json!({ "count": 36, "inside": 0 }));
+    // A bake that ended early goes on.
+    for spp in [5, 24] {
+        folder.object(&format!(
+            "bake scene.obj --probes 3x4x3 --spp {spp} --continue a.bake -o a.json -o a.csv -o a.ktx2 --json"
+        ));
+    }
+    for (name, ending) in
+        ["m", "a"].into_iter().flat_map(|name| [(name, "json"), (name, "csv"), (name, "ktx2")])
+    {
+        let [whole, parts] =
+            ["whole", name].map(|name| std::fs::read(folder.path(&format!("{name}.{ending}"))).unwrap());
+        assert!(whole == parts, "{name}.{ending}");
+    }
+    // Without ambient cubes.
+    folder.object(&format!("{bake} --checkpoint b.bake -o b.json"));
+    for (arguments, reason) in [
+        ("merge b.bake -o no.ktx2", "no ambient cubes"),
+        ("merge b.bake -o no.exr", "no.exr: probes are .json, .csv or .ktx2"),
+        ("merge b.bake -o no.json --error-map e.exr", "lightmaps alone"),
+    ] {
+        let said = folder.refused(arguments);
+        assert!(said.contains(reason), "{arguments}: {said}");
+    }
+}

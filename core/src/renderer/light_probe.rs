@@ -117,6 +117,44 @@ mod tests {
         }
     }
 
+    /// Root mean square errors of irradiance below a distant lamp in `direction`, of irradiance 1: by the exact
+    /// projection of its radiance, and by its irradiances at the normals of the design.
+    fn errors(direction: Vec3) -> [f64; 2] {
+        let irradiance = |normal: Vec3| normal.dot(direction).max(0.0);
+        let mut by_design = [0.0; 9];
+        for normal in design() {
+            let values = harmonics(normal).map(|harmonic| 4.0 * PI / 24.0 * harmonic * irradiance(normal));
+            by_design
+                .iter_mut()
+                .zip(values)
+                .zip(COSINE)
+                .for_each(|((sum, value), cosine)| *sum += value / cosine);
+        }
+        [harmonics(direction), by_design].map(|coefficients| {
+            let square = |i: u32| {
+                let (z, turns) = (1.0 - (2.0 * i as f32 + 1.0) / 1000.0, i as f32 * 0.618_034);
+                let (sin, cos) = (2.0 * PI * turns).sin_cos();
+                let normal = Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
+                let sum: f32 = (0..9).map(|k| coefficients[k] * COSINE[k] * harmonics(normal)[k]).sum();
+                f64::from(sum - irradiance(normal)).powi(2)
+            };
+            ((0..1000).map(square).sum::<f64>() / 1000.0).sqrt()
+        })
+    }
+
+    #[test]
+    fn a_distant_lamp_has_the_error_of_degree_two() {
+        // Degrees 0, 1 and 2 of the cosine have 1/16, 1/12 and 5/256 of its mean square, 1/6.
+        let truncation = (1.0f64 / 6.0 - 1.0 / 16.0 - 1.0 / 12.0 - 5.0 / 256.0).sqrt();
+        for i in 0..20 {
+            let (z, turns) = (0.95 - 0.1 * i as f32, 2.4 * i as f32);
+            let radius = (1.0 - z * z).sqrt();
+            let [exact, by_design] = errors(Vec3::new(radius * turns.cos(), radius * turns.sin(), z));
+            assert!((exact - truncation).abs() < 1e-3, "{exact} {truncation}");
+            assert!((0.035..0.041).contains(&by_design), "{by_design}");
+        }
+    }
+
     #[test]
     fn harmonics_are_orthonormal() {
         for (i, j) in (0..81).map(|pair| (pair / 9, pair % 9)) {

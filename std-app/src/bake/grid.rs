@@ -19,12 +19,12 @@ impl Grid {
     /// The cells that touch `cell`.
     fn neighbours(self, cell: usize) -> impl Iterator<Item = usize> {
         let place = self.place(cell);
-        let steps = (0..27).map(|step| [step % 3, step / 3 % 3, step / 9]);
-        steps.filter_map(move |step| {
-            let at: [usize; 3] = core::array::from_fn(|axis| (place[axis] + step[axis]).wrapping_sub(1));
-            let is_inside = at != place && (0..3).all(|axis| at[axis] < self.0[axis]);
-            is_inside.then(|| at[0] + self.0[0] * (at[1] + self.0[1] * at[2]))
-        })
+        let [across, down, deep] = [0, 1, 2].map(|axis| {
+            let (at, side) = (place[axis], self.0[axis]);
+            at.saturating_sub(1)..(at + 2).min(side)
+        });
+        let rows = deep.flat_map(move |z| down.clone().map(move |y| self.0[0] * (y + self.0[1] * z)));
+        rows.flat_map(move |row| across.clone().map(move |x| row + x)).filter(move |other| *other != cell)
     }
 
     /// Makes unknown cells known in at most `rings` rings around the known ones: `take(cell, from)` is called
@@ -37,15 +37,17 @@ impl Grid {
         mut take: impl FnMut(usize, &[usize]),
     ) {
         let may_take = &may_take;
-        let sources = |is_known: &[bool], cell: usize| {
-            let of_cell = self.neighbours(cell).filter(|&other| is_known[other] && may_take(cell, other));
-            of_cell.collect::<Vec<_>>()
-        };
+        let is_source =
+            |is_known: &[bool], cell: usize, other: usize| is_known[other] && may_take(cell, other);
+        let has_source = |cell: usize| self.neighbours(cell).any(|other| is_source(is_known, cell, other));
         let mut ring: Vec<usize> =
-            (0..self.len()).filter(|&cell| !is_known[cell] && !sources(is_known, cell).is_empty()).collect();
+            (0..self.len()).filter(|&cell| !is_known[cell] && has_source(cell)).collect();
+        let mut sources = Vec::new();
         for _ in 0..rings {
             for &cell in &ring {
-                take(cell, &sources(is_known, cell));
+                sources.clear();
+                sources.extend(self.neighbours(cell).filter(|&other| is_source(is_known, cell, other)));
+                take(cell, &sources);
             }
             ring.iter().for_each(|&cell| is_known[cell] = true);
             let around = |&cell: &usize| {

@@ -4,7 +4,7 @@
 use super::charts::{self, Charts, charts};
 use super::grid::Grid;
 use super::map::{Fetch, LightMap, Texel};
-use super::raster::{self, EMPTY, Raster, weights};
+use super::raster::{self, EMPTY, Raster, Watch, weights};
 use super::table::Quantity;
 use super::tilted::{linear, with_tilted};
 use crate::load::LoadedScene;
@@ -16,12 +16,13 @@ use core::ops::Range;
 use glam::{DVec2, Vec3};
 use halflight_core::IrradiancePoint;
 use halflight_core::scene::{Scene, Triangle};
+use serde::{Deserialize, Serialize};
 
 /// Fraction of back faces from which a point is inside a body, unless most points of the map are.
 const INSIDE: f32 = 0.5;
 
 /// Settings of a lightmap.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LightmapSettings {
     /// Name of the meshes, objects or materials whose triangles have texels; `None`: all.
     pub subject: Option<String>,
@@ -38,13 +39,13 @@ pub struct LightmapSettings {
 /// Texels of a lightmap and their points.
 #[derive(Debug)]
 pub struct Lightmap {
-    settings: LightmapSettings,
+    pub(super) settings: LightmapSettings,
     /// Chart of each texel, or [`EMPTY`].
-    charts: Vec<u32>,
-    chart_count: usize,
-    points: Vec<IrradiancePoint>,
+    pub(super) charts: Vec<u32>,
+    pub(super) chart_count: usize,
+    pub(super) points: Vec<IrradiancePoint>,
     /// Texel of each point, or of each four of them with four normals.
-    texels: Vec<u32>,
+    pub(super) texels: Vec<u32>,
     /// Sentences on doubtful charts.
     pub notes: Vec<String>,
 }
@@ -62,6 +63,8 @@ pub enum LightmapError {
     Texels,
     /// Insufficient memory.
     Memory(Shortage),
+    /// The watch ended the work.
+    Ended,
 }
 
 impl fmt::Display for LightmapError {
@@ -78,6 +81,7 @@ impl fmt::Display for LightmapError {
             }
             Self::Texels => write!(f, "the layers of the lightmap have more than {MAX_PIXELS} texels"),
             Self::Memory(why) => write!(f, "the lightmap is too large: {why}"),
+            Self::Ended => f.write_str("the lightmap was ended before its texels had points"),
         }
     }
 }
@@ -90,26 +94,28 @@ impl LightmapError {
         match self {
             Self::Subject(_, names) => format!("the names are all, {}", names.join(", ")),
             Self::Charts(_) | Self::Overlaps(..) => {
-                "unwrap the mesh into one square without overlaps, as by \
-                 Lightmap Pack of Blender or by xatlas, or choose a mesh, an object or a material by --lightmap NAME"
+                "unwrap the mesh into one square without overlaps, as by smart_project of Blender (the command is in \
+                 docs/bake.md) or by xatlas, or choose a mesh, an object or a material by --lightmap NAME"
                     .into()
             }
             Self::Texels => "lower --size".into(),
             Self::Memory(_) => "lower --size or --supersample, or raise --memory".into(),
+            Self::Ended => String::new(),
         }
     }
 }
 
 impl Lightmap {
     /// The texels of `loaded` and their points. Texels are taken from `budget`; the points are counted by
-    /// [`crate::bake::irradiance`].
+    /// [`crate::bake::irradiance`]. `watch` is called with the fraction that is done; false ends the work.
     ///
     /// # Errors
-    /// No charts, charts that overlap or leave the unit square, insufficient memory.
+    /// No charts, charts that overlap or leave the unit square, insufficient memory, an end by `watch`.
     pub fn new(
         loaded: &LoadedScene,
         settings: LightmapSettings,
         budget: &mut Budget,
+        watch: Watch,
     ) -> Result<Self, LightmapError> {
         let texels = settings.size.map(|side| side as usize).iter().product::<usize>();
         let layers = settings.layers();
@@ -122,7 +128,11 @@ impl Lightmap {
         let is_chosen = chosen(loaded, settings.subject.as_deref())?;
         let of_scene = charts(loaded, is_chosen, settings.size).map_err(LightmapError::Charts)?;
         let raster = Raster::new(&of_scene, settings.size);
-        let owners = raster.owners(DVec2::splat(0.5), |_, _| true);
+        // Charts are found in the first pass over the texels, and their points in others.
+        let passes = f64::from(settings.points) + 1.0;
+        let mut of_pass = |pass: u32, done: f64| watch((f64::from(pass) + done) / passes);
+        let owners = raster.owners(DVec2::splat(0.5), |_, _| true, &mut |done| of_pass(0, done));
+        let owners = owners.ok_or(LightmapError::Ended)?;
         if let Some((count, [x, y])) = owners.overlaps {
             let [width, height] = settings.size.map(f64::from);
             let uv = [(x as f64 + 0.5) / width, 1.0 - (y as f64 + 0.5) / height];
@@ -138,12 +148,18 @@ impl Lightmap {
         budget.has(used * layers * size_of::<IrradiancePoint>()).map_err(LightmapError::Memory)?;
         let (points, texels) = (Vec::with_capacity(used * layers), Vec::with_capacity(used));
         let mut map = Self { settings, charts, chart_count: of_scene.count, points, texels, notes };
-        map.place(loaded, &of_scene);
+        map.place(loaded, &of_scene, &mut |number, done| of_pass(number + 1, done))
+            .ok_or(LightmapError::Ended)?;
         Ok(map)
     }
 
     /// Adds the points of all texels, spread evenly over each (Hammersley 1960).
-    fn place(&mut self, loaded: &LoadedScene, charts: &Charts) {
+    fn place(
+        &mut self,
+        loaded: &LoadedScene,
+        charts: &Charts,
+        watch: &mut dyn FnMut(u32, f64) -> bool,
+    ) -> Option<()> {
         let views = loaded.views();
         let scene = views.scene(loaded.camera_or_default());
         let raster = Raster::new(charts, self.settings.size);
@@ -152,7 +168,8 @@ impl Lightmap {
             let across = (f64::from(number) + 0.5) / f64::from(count);
             let down = f64::from(number.reverse_bits()) / 2f64.powi(32);
             let offset = DVec2::new(across, down + 0.5 / f64::from(count.next_power_of_two()));
-            let owners = raster.owners(offset, |texel, chart| self.charts[texel] == chart);
+            let is_of_chart = |texel: usize, chart| self.charts[texel] == chart;
+            let owners = raster.owners(offset, is_of_chart, &mut |done| watch(number, done))?;
             let width = self.settings.size[0] as usize;
             for (texel, owner) in owners.triangles.into_iter().enumerate() {
                 let Some(triangle) = charts.triangles.get(owner as usize) else { continue };
@@ -160,6 +177,7 @@ impl Lightmap {
                 self.add(&scene, texel as u32, (triangle.triangle, weights(triangle, place)));
             }
         }
+        Some(())
     }
 
     /// Adds a point of a texel on the front of a triangle, by its normals.
@@ -184,6 +202,11 @@ impl Lightmap {
     pub fn filled(&self, map: &LightMap) -> usize {
         let is_filled = |(chart, texel): (&u32, &Texel)| *chart != EMPTY && *texel == Texel::Filled;
         self.charts.iter().zip(&map.texels).filter(|pair| is_filled(*pair)).count()
+    }
+
+    /// True if values are linear functions of the normal.
+    pub fn is_directional(&self) -> bool {
+        self.settings.directional
     }
 
     /// Number of charts.
@@ -250,7 +273,7 @@ impl Lightmap {
 }
 
 impl LightmapSettings {
-    fn layers(&self) -> usize {
+    pub(super) fn layers(&self) -> usize {
         if self.directional { 4 } else { 1 }
     }
 }

@@ -2,6 +2,7 @@
 //! [`halflight_core::IrradianceRenderer`]. [`crate::Renderer::irradiance_at`] needs a loaded scene
 //! and [`Sensor`]s alone.
 
+mod attachment;
 mod charts;
 mod grid;
 mod ktx2;
@@ -16,13 +17,15 @@ mod table;
 mod tilted;
 
 pub use crate::render::{BakeProgress, BakeSettings, Baked};
+pub use attachment::{BakeSubject, attachment};
 pub use halflight_core::IrradiancePoint;
 pub use lightmap::{Lightmap, LightmapError, LightmapSettings};
 pub use map::{LightMap, Texel, check as check_format};
-pub use merge::{MergedBake, attachment, is_bake, merge};
+pub use merge::{MergedBake, is_bake, merge};
 pub use points::{Sensor, read_sensors, vertices};
 pub use probe_files::{ProbeFormat, write_probes};
 pub use probes::{Probe, ProbeGrid, ProbeSettings};
+pub use raster::Watch;
 pub use table::{Quantity, TableFormat, write_table};
 
 use crate::memory::Budget;

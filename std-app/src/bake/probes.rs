@@ -44,8 +44,8 @@ pub struct Probe {
 /// Probes of a grid and their points.
 #[derive(Debug)]
 pub struct ProbeGrid {
-    settings: ProbeSettings,
-    bounds: [[f64; 3]; 2],
+    pub(super) settings: ProbeSettings,
+    pub(super) bounds: [[f64; 3]; 2],
     normals: Vec<Vec3>,
     points: Vec<IrradiancePoint>,
 }
@@ -57,13 +57,11 @@ impl ProbeGrid {
     /// # Errors
     /// Insufficient memory.
     pub fn new(loaded: &LoadedScene, settings: ProbeSettings, budget: &mut Budget) -> Result<Self, Shortage> {
-        let normals: Vec<Vec3> =
-            LightProbe::normals().into_iter().chain(AXES.into_iter().filter(|_| settings.cubes)).collect();
+        let bounds = settings.bounds.unwrap_or_else(|| scene_bounds(loaded));
+        let mut grid = Self::without_points(settings, bounds);
         let count = settings.size.iter().fold(1usize, |count, side| count.saturating_mul(*side as usize));
         budget.take(count.saturating_mul(size_of::<Probe>()))?;
-        budget.has(count.saturating_mul(normals.len() * size_of::<IrradiancePoint>()))?;
-        let bounds = settings.bounds.unwrap_or_else(|| scene_bounds(loaded));
-        let mut grid = Self { settings, bounds, normals, points: Vec::new() };
+        budget.has(count.saturating_mul(grid.normals.len() * size_of::<IrradiancePoint>()))?;
         grid.points.reserve_exact(count * grid.normals.len());
         for cell in 0..count {
             let position = loaded.transform.point(grid.position(cell));
@@ -72,9 +70,21 @@ impl ProbeGrid {
         Ok(grid)
     }
 
+    /// The grid of a bake whose values exist.
+    pub(super) fn without_points(settings: ProbeSettings, bounds: [[f64; 3]; 2]) -> Self {
+        let normals =
+            LightProbe::normals().into_iter().chain(AXES.into_iter().filter(|_| settings.cubes)).collect();
+        Self { settings, bounds, normals, points: Vec::new() }
+    }
+
     /// The points at which irradiance is to be estimated.
     pub fn points(&self) -> &[IrradiancePoint] {
         &self.points
+    }
+
+    /// True if ambient cubes are estimated.
+    pub fn has_cubes(&self) -> bool {
+        self.settings.cubes
     }
 
     /// Number of probes along each axis.

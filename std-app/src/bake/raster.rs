@@ -10,6 +10,12 @@ pub(super) const EMPTY: u32 = u32::MAX;
 /// Half the side of the square around the centre of a texel in which a bilinear fetch reads it.
 const REACH: f64 = 1.0;
 
+/// Texels between two calls of a watch.
+const WATCHED: u32 = 1 << 16;
+
+/// Function of the fraction of the work that is done; false ends it.
+pub type Watch<'w> = &'w mut dyn FnMut(f64) -> bool;
+
 /// Distance of the owner of a texel that is known to overlap.
 const COUNTED: f64 = -1.0;
 
@@ -38,16 +44,32 @@ impl<'a> Raster<'a> {
     }
 
     /// The triangle at or nearest to the point at `offset` (0 to 1) in each texel, among the triangles of
-    /// charts that `may_own(texel, chart)`.
-    pub(super) fn owners(&self, offset: DVec2, may_own: impl Fn(usize, u32) -> bool) -> Owners {
+    /// charts that `may_own(texel, chart)`. `watch` is called now and then with the fraction of the triangles
+    /// that are done; `None` if it returns false.
+    pub(super) fn owners(
+        &self,
+        offset: DVec2,
+        may_own: impl Fn(usize, u32) -> bool,
+        watch: Watch,
+    ) -> Option<Owners> {
         let [width, height] = self.size;
         let triangles = &self.charts.triangles;
         let mut owners = vec![EMPTY; width * height];
         let mut distances = vec![f64::INFINITY; width * height];
         let mut is_shared = vec![false; width * height];
         let mut overlaps: Option<(usize, [usize; 2])> = None;
+        let mut unwatched = WATCHED;
         for (number, triangle) in (0..).zip(triangles) {
+            let mut is_wanted = true;
             self.for_texels(triangle, |[x, y]| {
+                unwatched -= 1;
+                if unwatched == 0 {
+                    unwatched = WATCHED;
+                    is_wanted = is_wanted && watch(f64::from(number) / triangles.len() as f64);
+                }
+                if !is_wanted {
+                    return;
+                }
                 let texel = y * width + x;
                 if !may_own(texel, triangle.chart) {
                     return;
@@ -66,9 +88,12 @@ impl<'a> Raster<'a> {
                     (owners[texel], distances[texel]) = (number, distance);
                 }
             });
+            if !is_wanted {
+                return None;
+            }
         }
         let shared = is_shared.into_iter().filter(|is_shared| *is_shared).count();
-        Owners { triangles: owners, shared, overlaps }
+        Some(Owners { triangles: owners, shared, overlaps })
     }
 
     /// Calls `visit` with the texels that a fetch inside `triangle` reads, row by row.
@@ -190,7 +215,8 @@ mod tests {
         for is_mirrored in [false, true] {
             let charts = lattice(is_mirrored);
             for offset in [DVec2::ZERO, DVec2::splat(0.5)] {
-                let owners = Raster::new(&charts, [24, 24]).owners(offset, |_, _| true);
+                let owners =
+                    Raster::new(&charts, [24, 24]).owners(offset, |_, _| true, &mut |_| true).unwrap();
                 assert_eq!((owners.overlaps, owners.shared), (None, 0));
                 let is_inside = |texel: usize| {
                     let point = DVec2::new((texel % 24) as f64, (texel / 24) as f64) + offset;
@@ -203,11 +229,26 @@ mod tests {
     }
 
     #[test]
+    fn a_watch_ends_the_work_within_a_triangle() {
+        let corners = [DVec2::ZERO, DVec2::new(1024.0, 0.0), DVec2::new(0.0, 1024.0)];
+        let charts =
+            Charts { triangles: vec![ChartTriangle { triangle: 0, chart: 0, corners }], count: 1, flat: 0 };
+        let mut calls = 0;
+        let mut watch = |_| {
+            calls += 1;
+            calls < 3
+        };
+        assert!(Raster::new(&charts, [1024; 2]).owners(DVec2::ZERO, |_, _| true, &mut watch).is_none());
+        assert_eq!(calls, 3);
+    }
+
+    #[test]
     fn texels_in_several_triangles_are_counted_once() {
         let mut charts = lattice(false);
         let copies = [charts.triangles.clone(), charts.triangles.clone()].concat();
         charts.triangles.extend(copies);
-        let owners = Raster::new(&charts, [24, 24]).owners(DVec2::splat(0.5), |_, _| true);
+        let owners =
+            Raster::new(&charts, [24, 24]).owners(DVec2::splat(0.5), |_, _| true, &mut |_| true).unwrap();
         assert_eq!(owners.overlaps, Some((576, [0, 0])));
     }
 

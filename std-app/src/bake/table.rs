@@ -3,6 +3,7 @@
 use super::points::Sensor;
 use core::f32::consts::FRAC_1_PI;
 use halflight_core::{PointIrradiance, Rgb};
+use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -11,7 +12,7 @@ const RADIANCE_EFFICACY: f32 = 179.0;
 const RADIANCE_WEIGHTS: Rgb = Rgb::new(0.265, 0.670, 0.065);
 
 /// The quantity of a table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Quantity {
     /// Irradiance in W/m²; the value is its luminance by the weights of sRGB.
     #[default]

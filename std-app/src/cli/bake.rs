@@ -3,16 +3,17 @@
 mod lightmap;
 mod probes;
 
+use super::bake_files::TableFiles;
 use super::bake_parts::BakeParts;
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
-use super::outputs::{Outputs, Role};
+use super::outputs::Outputs;
 use super::picture_args::{Caustics, note_darkness, render_failure};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::{print_note, values};
 use clap::{Args, ValueEnum};
 use halflight::bake::{
-    self, BakeSettings, Baked, Quantity, Sensor, TableFormat, attachment, read_sensors, vertices, write_table,
+    self, BakeSettings, Baked, Quantity, TableFormat, attachment, read_sensors, vertices, write_table,
 };
 use halflight::load::{self, LoadOptions, LoadedScene};
 use halflight::memory::Budget;
@@ -62,7 +63,7 @@ pub(super) struct Bake {
 
     /// Source of indirect light. A cache shares it among near points, and an audit adds its bias to the
     /// intervals; `auto` takes one where it is predicted to have less error
-    #[arg(long, default_value = "path", conflicts_with_all = ["checkpoint", "resume", "shard"])]
+    #[arg(long, default_value = "path", conflicts_with_all = ["kept", "resume", "shard"])]
     method: Method,
 
     /// Samples per point
@@ -139,8 +140,8 @@ impl Bake {
             return run;
         }
         let mut outputs = Outputs::new(self.json);
-        let tables = tables(&self.output)?;
-        tables.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
+        let tables = TableFiles::new(&self.output)?;
+        tables.plan(&mut outputs)?;
         self.parts.plan(&mut outputs)?;
         let file = self.points.as_deref().filter(|file| *file != Path::new("-"));
         file.map_or(Ok(()), |file| outputs.protect(file))?;
@@ -154,14 +155,13 @@ impl Bake {
             None => vertices(&loaded),
         };
         let attached = attachment(&sensors, self.quantity());
-        let baked = self.bake(&loaded, &points, (self.memory, attached))?;
+        let baked = self.bake(&loaded, &points, (self.memory, attached), 0.0)?;
         baked.unsaved.iter().for_each(|why| outputs.fail(why.clone()));
-        for (path, format) in &tables {
-            outputs.save_table(path, |out| self.write(out, *format, &sensors, &baked));
-        }
-        if tables.is_empty() && !self.json && !self.parts.is_part() {
+        tables.save(&mut outputs, (&sensors, &baked, self.quantity()));
+        if self.output.is_empty() && !self.json && !self.parts.is_part() {
             let mut table = Vec::new();
-            self.write(&mut table, TableFormat::Csv, &sensors, &baked)?;
+            let columns = (&baked.values[..], &baked.back_faces[..]);
+            write_table(&mut table, (TableFormat::Csv, self.quantity()), &sensors, columns)?;
             print_note(self.text(&baked));
             let table = String::from_utf8_lossy(&table);
             return Ok(outputs.end(table.trim_end(), code(&baked)));
@@ -174,14 +174,17 @@ impl Bake {
         let loaded = load::load(&self.scene, options)?;
         loaded.files.iter().try_for_each(|file| outputs.protect(file))?;
         loaded.repairs.iter().for_each(print_note);
+        interrupt::install_handler()?;
         Ok(loaded)
     }
 
+    /// Bakes `points` after so many seconds of the time limit.
     fn bake(
         &self,
         loaded: &LoadedScene,
         points: &[IrradiancePoint],
         (memory, attached): (Option<usize>, Vec<u8>),
+        spent: f64,
     ) -> Result<Baked, Failure> {
         let views = loaded.views();
         let scene = views.scene(loaded.camera_or_default());
@@ -192,8 +195,10 @@ impl Bake {
             true => Stop { spp: stop.spp.or(Some(4)), ..stop },
             false => stop,
         };
+        // Points have samples after the end as well.
+        let left = |seconds: f64| (seconds - spent).max(f64::MIN_POSITIVE);
         let settings = BakeSettings {
-            stop,
+            stop: Stop { seconds: stop.seconds.map(left), ..stop },
             light: match self.light {
                 Light::All => LightPart::All,
                 Light::Direct => LightPart::Direct,
@@ -213,20 +218,27 @@ impl Bake {
             ..BakeSettings::default()
         };
         let settings = self.parts.add_to(settings, attached);
-        interrupt::install_handler()?;
         let mut reporter = ProgressReporter::new();
         let mut progress = |progress: &bake::BakeProgress| {
             let [tiles, finished] = progress.tiles;
             let within = self.error.map_or(String::new(), |_| format!(", {finished} of {tiles} tiles"));
             let seconds = readable_seconds(progress.seconds);
-            let text = format!("{} samples per point{within}, {seconds}", progress.samples);
+            let text = match progress.samples {
+                0 => format!("fractions of back faces, {seconds}"),
+                samples => format!("{samples} samples per point{within}, {seconds}"),
+            };
             let state =
                 json!({ "samples": progress.samples, "tiles": { "all": tiles, "finished": finished } });
             reporter.report_text((&text, state), progress.seconds, progress.seconds_left);
         };
         let baked = bake::irradiance(&scene, points, &settings, &mut progress, &INTERRUPT);
         reporter.end();
-        baked.map_err(|error| render_failure(&self.scene, &error))
+        let baked = baked.map_err(|error| render_failure(&self.scene, &error))?;
+        let missing = baked.values.iter().filter(|value| value.samples == 0).count();
+        if missing > 0 && !self.parts.is_part() {
+            print_note(format!("{missing} points have no samples yet: their values are 0"));
+        }
+        Ok(baked)
     }
 
     /// True if an output has the fractions of back faces.
@@ -241,17 +253,6 @@ impl Bake {
             Unit::White => Quantity::White,
             Unit::Lux => Quantity::Lux,
         }
-    }
-
-    fn write(
-        &self,
-        out: &mut dyn std::io::Write,
-        format: TableFormat,
-        sensors: &[Sensor],
-        baked: &Baked,
-    ) -> std::io::Result<()> {
-        let columns = (&baked.values[..], &baked.back_faces[..]);
-        write_table(out, (format, self.quantity()), sensors, columns)
     }
 
     fn object(&self, baked: &Baked) -> Value {
@@ -290,16 +291,6 @@ impl Bake {
     }
 }
 
-/// Files and formats of tables.
-pub(super) fn tables(paths: &[PathBuf]) -> Result<Vec<(PathBuf, TableFormat)>, Failure> {
-    let format = |path: &PathBuf| match TableFormat::of(path) {
-        Some(format) => Ok((path.clone(), format)),
-        None => Err(Failure::new(format!("{}: a table is .csv, .res or .ply", path.display()))
-            .advice("choose a name with one of these endings")),
-    };
-    paths.iter().map(format).collect()
-}
-
 fn code(baked: &Baked) -> ExitCode {
     if baked.is_interrupted { ExitCode::from(3) } else { ExitCode::SUCCESS }
 }
@@ -310,9 +301,9 @@ fn memory(bake: &Bake, loaded: &LoadedScene) -> Budget {
     bake::budget(&views.scene(loaded.camera_or_default()), bake.memory)
 }
 
-/// Checks that there is an output: maps and probes are no text.
+/// Checks that a whole bake has an output: maps and probes are no text.
 fn check_outputs(bake: &Bake, flag: &str, example: &str) -> Result<(), Failure> {
-    match bake.output.is_empty() {
+    match bake.output.is_empty() && !bake.parts.is_part() {
         true => {
             Err(Failure::new(format!("{flag} has no output")).advice(format!("name one, as in {example}")))
         }

@@ -1,13 +1,13 @@
 //! `halflight merge`: a picture from the films of all shards, or tables from bakes.
 
-use super::bake::tables;
+use super::bake_files::{BakeFiles, check_no_error_map};
 use super::failure::Failure;
 use super::layer_args::LayerArgs;
 use super::outputs::{Outputs, Picture, Role};
 use super::view_args::ViewArgs;
 use super::{summary, values};
 use clap::Args;
-use halflight::bake::{self, MergedBake};
+use halflight::bake;
 use halflight::layers::{Facts, LayerSource};
 use halflight::render::{self, Merged};
 use halflight::report::{Provenance, dropped_object, error_object, file_name, findings_object};
@@ -27,7 +27,8 @@ pub(super) struct Merge {
     /// Films, one of each shard
     #[arg(required = true)]
     films: Vec<PathBuf>,
-    /// Picture: .png, .exr, .hdr or .pfm; table of a bake: .csv, .res or .ply; may be repeated
+    /// Picture: .png, .exr, .hdr or .pfm; of a bake its table (.csv, .res or .ply), lightmap (.exr, .hdr or .pfm)
+    /// or probes (.json, .csv or .ktx2); may be repeated
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -35,6 +36,9 @@ pub(super) struct Merge {
     /// Add the samples per pixel that relMSE needs to fall to this value, of pictures of the same settings
     #[arg(long, value_name = "RELMSE", value_parser = values::checked::<f64, TargetError>)]
     for_error: Option<TargetError>,
+    /// Map of the half-widths of the intervals of a lightmap: .exr, .hdr or .pfm
+    #[arg(long, value_name = "FILE")]
+    error_map: Option<PathBuf>,
     #[command(flatten)]
     layers: LayerArgs,
     /// Print one JSON object instead of text
@@ -47,6 +51,7 @@ impl Merge {
         if self.films.first().is_some_and(|film| bake::is_bake(film)) {
             return self.run_bake();
         }
+        check_no_error_map(self.error_map.as_deref())?;
         let mut outputs = Outputs::new(self.json);
         self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
         self.films.iter().try_for_each(|film| outputs.protect(film))?;
@@ -72,19 +77,16 @@ impl Merge {
     /// Merges bakes.
     fn run_bake(&self) -> Result<ExitCode, Failure> {
         let mut outputs = Outputs::new(self.json);
-        let tables = tables(&self.output)?;
-        tables.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
+        let merged = bake::merge(&self.films)?;
+        let files = BakeFiles::new(&merged.subject, (&self.output, self.error_map.as_deref()))?;
+        files.plan(&mut outputs)?;
         self.films.iter().try_for_each(|film| outputs.protect(film))?;
-        let MergedBake { baked, sensors, quantity } = bake::merge(&self.films)?;
-        for (path, format) in &tables {
-            let table = (*format, quantity);
-            outputs.save_table(path, |out| {
-                bake::write_table(out, table, &sensors, (&baked.values, &baked.back_faces))
-            });
-        }
+        let saved = files.save(&mut outputs, &merged);
+        let baked = &merged.baked;
         let spp = baked.values.iter().map(|value| value.samples).min().unwrap_or_default();
+        let head = saved.as_ref().map_or(String::new(), ToString::to_string);
         let object = || {
-            json!({
+            let mut object = json!({
                 "points": baked.values.len(),
                 "shards": self.films.len(),
                 "spp": spp,
@@ -94,9 +96,13 @@ impl Merge {
                 "rays": baked.counters.all_rays(),
                 "paths": baked.counters.paths,
                 "outputs": self.output.iter().map(|file| file_name(file)).collect::<Value>(),
-            })
+            });
+            if let Some(saved) = saved {
+                saved.add_to(&mut object);
+            }
+            object
         };
-        let text = || format!("{} points, {spp} samples each", baked.values.len());
+        let text = || format!("{head}{} points, {spp} samples each", baked.values.len());
         Ok(outputs.end_with(object, text, ExitCode::SUCCESS))
     }
 

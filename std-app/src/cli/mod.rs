@@ -2,6 +2,7 @@
 //! docs/cli.md its interface for scripts.
 
 mod bake;
+mod bake_files;
 mod bake_parts;
 mod camera_args;
 mod checkpoint_args;

@@ -5,17 +5,19 @@ use super::files::{BakeReader, Tables};
 use super::points::Baked;
 use super::threads::{Pool, Workers};
 use crate::memory::{Budget, lines};
+use halflight_core::IrradiancePoint;
 use halflight_core::findings::Findings;
 use halflight_core::memory::Arena;
 use halflight_core::method::Shard;
 use halflight_core::renderer::PointFilm;
 use std::path::{Path, PathBuf};
 
-/// Merges the bakes in `files`, in any order. Returns the bytes that the caller attached as well.
+/// Merges the bakes in `files`, in any order. Returns the points in the order of the values, and the bytes that
+/// the caller attached, as well.
 ///
 /// # Errors
 /// Names the first file that does not belong to the first one and why, or missing and repeated shards.
-pub(crate) fn merge_points(files: &[PathBuf]) -> Result<(Baked, Vec<u8>), RenderError> {
+pub(crate) fn merge_points(files: &[PathBuf]) -> Result<(Baked, Vec<IrradiancePoint>, Vec<u8>), RenderError> {
     let most = Budget::new(None).limit();
     let bakes = files.iter().map(|file| BakeReader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
     let (Some(first), Some(name)) = (bakes.first(), files.first()) else { return Err(RenderError::Shard) };
@@ -52,7 +54,11 @@ pub(crate) fn merge_points(files: &[PathBuf]) -> Result<(Baked, Vec<u8>), Render
         is_interrupted: false,
         unsaved: None,
     };
-    Ok((baked, attached))
+    // Replicates of a point differ in their numbers.
+    let replicates = (points.len() / count).max(1);
+    let of_values = places.iter().step_by(replicates);
+    let points = of_values.map(|place| points.get(*place as usize).copied().unwrap_or_default()).collect();
+    Ok((baked, points, attached))
 }
 
 /// # Errors

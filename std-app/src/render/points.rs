@@ -28,6 +28,9 @@ const FIRST_SAMPLES: u32 = 4;
 /// Longest round in seconds, for regular progress.
 const LONGEST_ROUND: f64 = 0.5;
 
+/// Points whose fractions of back faces are counted between two reports.
+const BACK_FACES_AT_ONCE: usize = 1 << 16;
+
 /// Settings of irradiance at points.
 #[derive(Clone, Debug)]
 pub struct BakeSettings {
@@ -91,7 +94,7 @@ impl Default for BakeSettings {
 /// Progress of a bake.
 #[derive(Clone, Copy, Debug)]
 pub struct BakeProgress {
-    /// Samples of the least sampled point.
+    /// Samples of the least sampled point; 0 while fractions of back faces are counted.
     pub samples: u32,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],
@@ -241,7 +244,12 @@ pub(crate) fn with_points(
     let mut shares = vec![0.0; if settings.back_faces { points.len() } else { 0 }];
     // The rest of the time is for the samples.
     let end = End::Round(workers.deadline.after(0.5));
-    back_faces(&context, points, &mut shares, &mut Threads::new(&workers, &mut scratch).until(end))?;
+    for (points, shares) in points.chunks(BACK_FACES_AT_ONCE).zip(shares.chunks_mut(BACK_FACES_AT_ONCE)) {
+        back_faces(&context, points, shares, &mut Threads::new(&workers, &mut scratch).until(end))?;
+        let seconds = start.elapsed().as_secs_f64();
+        let seconds_left = settings.stop.seconds.map(|limit| (limit - seconds).max(0.0));
+        progress(&BakeProgress { samples: 0, tiles: [0; 2], seconds, seconds_left });
+    }
     let mut executor = Threads::new(&workers, &mut scratch).until(End::FirstRound(None));
     let lights = built.lights.with_level(settings.level);
     let structures = (scene, built.bvh, lights);

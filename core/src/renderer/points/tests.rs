@@ -115,6 +115,46 @@ fn a_point_light_gives_the_cosine_law() {
 }
 
 #[test]
+fn points_at_the_feet_of_walls_are_in_front_of_them() {
+    // A closed box without light in a sky, from inside.
+    let faces = [
+        [4, 5, 6],
+        [4, 6, 7],
+        [8, 10, 9],
+        [8, 11, 10],
+        [4, 8, 9],
+        [4, 9, 5],
+        [5, 9, 10],
+        [5, 10, 6],
+        [6, 10, 11],
+        [6, 11, 7],
+        [7, 11, 8],
+        [7, 8, 4],
+    ];
+    let (triangles, materials) = (triangles(&faces), [Material::diffuse(Rgb::ZERO)]);
+    let scene = scene(&triangles, &materials);
+    let steps = (0..9).filter(|i| *i != 4).map(|i| [0.5 + 0.5 * (i % 3) as f32, 0.5 + 0.5 * (i / 3) as f32]);
+    let free = steps.map(|[x, z]| IrradiancePoint::free(Vec3::new(x, 0.0, z), Vec3::Y));
+    let corners = (0..36).filter_map(|i| {
+        let weights = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]][i as usize % 3];
+        IrradiancePoint::on_triangle(&scene, i / 3, weights, true)
+    });
+    let inside: Vec<_> = free.chain(corners).collect();
+    assert_eq!(inside.len(), 8 + 36);
+    for (point, value) in inside.iter().zip(values(&scene, &inside, Until::Samples(64), 0).unwrap()) {
+        assert_eq!(value.value(), 0.0, "{point:?}");
+    }
+    // Borders without walls.
+    let floor = [Triangle { vertices: FLOOR[0], material: 0 }];
+    let scene = Scene { mesh: Mesh { triangles: &floor, ..scene.mesh }, ..scene };
+    let border = [[-2.0, -2.0], [-2.0, 0.5], [1.0, 1.0]].map(|[x, z]| Vec3::new(x, 0.0, z));
+    let border = border.map(|position| IrradiancePoint::free(position, Vec3::Y));
+    for value in values(&scene, &border, Until::Samples(16), 0).unwrap() {
+        assert!((value.value() / (2.0 * PI) - 1.0).abs() < 1e-5, "{value:?}");
+    }
+}
+
+#[test]
 fn points_of_triangles_look_to_their_sides() {
     let (triangles, materials) = (triangles(&FLOOR), [Material::diffuse(Rgb::ZERO)]);
     let scene = scene(&triangles, &materials);

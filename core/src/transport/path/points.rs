@@ -111,13 +111,40 @@ impl IrradiancePoint {
     }
 
     /// A free point that lies on a surface within rounding is put on it, on the side of its normal: sensors
-    /// at height 0 of a floor are above the floor. Other points stay.
+    /// at height 0 of a floor are above the floor. A point of a surface at the foot of a wall is put in front
+    /// of the wall by its rounding. Other points stay.
     #[doc(hidden)]
     pub fn settled<F: Features>(self, context: &SceneContext<F>) -> Self {
+        let point = if self.triangle == MISS { self.on_surface(context) } else { self };
+        if point.triangle == MISS { point } else { point.off_walls(context) }
+    }
+
+    /// A point of a triangle whose border is the foot of a wall, in front of it: rays of the very border begin
+    /// in the plane of the wall and pass it by.
+    fn off_walls<F: Features>(self, context: &SceneContext<F>) -> Self {
+        let corners = context.scene.mesh.corners(self.triangle);
+        let (position, middle) = (Vec3::from(self.position), corners.iter().sum::<Vec3>() / 3.0);
+        let margin = LIES_ON * (self.error + POINT_ROUNDING * position.abs().max_element());
+        // Part of the distance to the middle, which is as far from each edge as a third of its height.
+        let part = |i: usize| {
+            let (a, along) = (corners[i], corners[(i + 1) % 3] - corners[i]);
+            let height = (corners[(i + 2) % 3] - a).reject_from(along);
+            let (full, distance) = (height.length(), (position - a).dot(height.normalize_or_zero()));
+            let missing = (margin - distance).max(0.0);
+            missing / (full / 3.0 - distance).max(missing).max(f32::MIN_POSITIVE)
+        };
+        let step = part(0).max(part(1)).max(part(2)) * (middle - position);
+        let Some(direction) = step.try_normalize() else { return self };
+        let inside = position + step;
+        // Across the border, above the surface.
+        let origin = inside + self.error * Vec3::from(self.geometric_normal);
+        let has_wall = context.nearest(&Ray::segment(origin, -direction, 2.0 * step.length())).is_some();
+        if has_wall { Self { position: inside.to_array(), ..self } } else { self }
+    }
+
+    /// The point on a surface that it lies on within rounding, or as it is.
+    fn on_surface<F: Features>(self, context: &SceneContext<F>) -> Self {
         let (position, normal) = (Vec3::from(self.position), Vec3::from(self.normal));
-        if self.triangle != MISS {
-            return self;
-        }
         let rounding = POINT_ROUNDING * position.abs().max_element();
         // From above to below, since rays along the surface would not meet it.
         let above = 0.5 * LIES_ON * LIES_ON * rounding;

@@ -1,23 +1,27 @@
 //! Lightmaps by `halflight bake`.
 
 use super::{Bake, check_outputs, code, memory};
+use crate::cli::bake_files::MapFiles;
 use crate::cli::failure::Failure;
-use crate::cli::outputs::{Outputs, Role};
+use crate::cli::interrupt::INTERRUPT;
+use crate::cli::outputs::Outputs;
+use crate::cli::progress::ProgressReporter;
 use crate::cli::{print_note, values};
 use clap::Args;
-use halflight::bake::{Lightmap, LightmapSettings, Texel, check_format};
+use core::sync::atomic::Ordering;
+use halflight::bake::{Lightmap, LightmapError, LightmapSettings};
 use halflight::load::LoadOptions;
 use halflight::report::file_name;
-use halflight::save::{FileError, Format};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 /// Rings of texels around charts without `--pad`: enough for bilinear fetches of two mip levels.
 const PADDING: u32 = 4;
 
 /// Subjects of other runs. clap drops a requirement that conflicts with another flag.
-const OTHERS: [&str; 6] = ["points", "vertices", "probes", "checkpoint", "resume", "shard"];
+const OTHERS: [&str; 3] = ["points", "vertices", "probes"];
 
 #[derive(Args)]
 pub(super) struct LightmapArgs {
@@ -52,10 +56,9 @@ impl LightmapArgs {
 
     fn run_lightmap(&self, bake: &Bake, (subject, size): (&str, [u32; 2])) -> Result<ExitCode, Failure> {
         let mut outputs = Outputs::new(bake.json);
-        let maps = pictures(&bake.output, self.directional)?;
-        let error_map = pictures(self.error_map.as_slice(), false)?;
-        maps.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
-        error_map.iter().try_for_each(|(path, _)| outputs.plan(Role::ErrorMap, path))?;
+        let files = MapFiles::new(&bake.output, self.error_map.as_deref(), self.directional)?;
+        files.plan(&mut outputs)?;
+        bake.parts.plan(&mut outputs)?;
         check_outputs(bake, "--lightmap", "-o map.exr")?;
         let options = LoadOptions { memory: bake.memory, keeps_texcoords: true, ..LoadOptions::default() };
         let loaded = bake.load(&outputs, &options)?;
@@ -68,47 +71,38 @@ impl LightmapArgs {
         };
         let mut memory = memory(bake, &loaded);
         let before = memory.left();
-        let lightmap = Lightmap::new(&loaded, settings, &mut memory).map_err(|error| {
-            Failure::new(format!("{}: {error}", bake.scene.display())).advice(error.advice())
-        })?;
+        let start = Instant::now();
+        let mut reporter = ProgressReporter::new();
+        let mut watch = |done: f64| {
+            let text = format!("points of texels, {:.0} %", 100.0 * done);
+            reporter.report_text((&text, json!({ "samples": 0 })), start.elapsed().as_secs_f64(), None);
+            !INTERRUPT.load(Ordering::Relaxed)
+        };
+        let lightmap = Lightmap::new(&loaded, settings, &mut memory, &mut watch);
+        reporter.end();
+        let lightmap = match lightmap {
+            Err(error @ LightmapError::Ended) => {
+                let object = || json!({ "interrupted": true, "outputs": [] });
+                return Ok(outputs.end_with(object, || error.to_string(), ExitCode::from(3)));
+            }
+            lightmap => lightmap.map_err(|error| {
+                Failure::new(format!("{}: {error}", bake.scene.display())).advice(error.advice())
+            })?,
+        };
         lightmap.notes.iter().for_each(print_note);
-        let baked = bake.bake(
-            &loaded,
-            lightmap.points(),
-            (Some(memory.limit() + memory.left() - before), Vec::new()),
-        )?;
-        let map = lightmap.map(&baked, bake.quantity());
-        maps.iter().for_each(|(path, format)| save(&mut outputs, path, map.encode(*format)));
-        error_map.iter().for_each(|(path, format)| save(&mut outputs, path, map.encode_error(*format)));
-        let (computed, filled) = (map.count(Texel::Computed), lightmap.filled(&map));
-        let padded = map.count(Texel::Filled) - filled;
-        let charts = lightmap.charts();
+        let limit = Some(memory.limit() + memory.left() - before);
+        let attached = lightmap.attachment(bake.quantity());
+        let baked =
+            bake.bake(&loaded, lightmap.points(), (limit, attached), start.elapsed().as_secs_f64())?;
+        baked.unsaved.iter().for_each(|why| outputs.fail(why.clone()));
+        let saved = files.save(&mut outputs, (&lightmap, &baked, bake.quantity()));
+        let text = format!("{saved}{}", bake.text(&baked));
         let object = || {
             let mut object = bake.object(&baked);
-            object["charts"] = charts.into();
-            object["texels"] = json!({ "computed": computed, "filled": filled, "padded": padded });
+            saved.add_to(&mut object);
             object["error_map"] = self.error_map.as_deref().map_or(Value::Null, file_name);
             object
         };
-        let texels = format!("{charts} charts, {computed} texels computed and {filled} filled");
-        Ok(outputs.end_with(object, || format!("{texels}; {}", bake.text(&baked)), code(&baked)))
-    }
-}
-
-/// Files and formats of maps.
-fn pictures(paths: &[PathBuf], is_signed: bool) -> Result<Vec<(PathBuf, Format)>, Failure> {
-    let format = |path: &PathBuf| {
-        let format = Format::of(path)?;
-        check_format(format, is_signed)
-            .map_err(|error| Failure::new(format!("{}: {error}", path.display())))?;
-        Ok((path.clone(), format))
-    };
-    paths.iter().map(format).collect()
-}
-
-fn save(outputs: &mut Outputs, path: &Path, bytes: Result<Vec<u8>, FileError>) {
-    match bytes {
-        Ok(bytes) => outputs.save_table(path, |out| out.write_all(&bytes)),
-        Err(error) => outputs.fail(error),
+        Ok(outputs.end_with(object, || text, code(&baked)))
     }
 }

@@ -1,21 +1,20 @@
 //! Grids of light probes by `halflight bake`.
 
 use super::{Bake, check_outputs, code, memory};
+use crate::cli::bake_files::ProbeFiles;
 use crate::cli::failure::Failure;
-use crate::cli::outputs::{Outputs, Role};
+use crate::cli::outputs::Outputs;
 use crate::cli::values;
 use clap::Args;
-use halflight::bake::{ProbeFormat, ProbeGrid, ProbeSettings, write_probes};
+use halflight::bake::{ProbeGrid, ProbeSettings};
 use halflight::load::LoadOptions;
-use serde_json::json;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[derive(Args)]
 pub(super) struct ProbeArgs {
     /// Light probes at the centres of so many cells along x, y and z
     #[arg(long, value_name = "NXxNYxNZ", value_parser = values::grid,
-          conflicts_with_all = ["points", "vertices", "lightmap", "unit", "checkpoint", "resume", "shard"])]
+          conflicts_with_all = ["points", "vertices", "lightmap", "unit"])]
     probes: Option<[u32; 3]>,
     /// Box of the cells of probes in the coordinates of the files [default: that of the scene]
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds,
@@ -31,17 +30,14 @@ impl ProbeArgs {
 
     fn run_probes(&self, bake: &Bake, size: [u32; 3]) -> Result<ExitCode, Failure> {
         let mut outputs = Outputs::new(bake.json);
-        let format = |path: &PathBuf| match ProbeFormat::of(path) {
-            Some(format) => Ok((path.clone(), format)),
-            None => Err(Failure::new(format!("{}: probes are .json, .csv or .ktx2", path.display()))
-                .advice("choose a name with one of these endings")),
-        };
-        let files = bake.output.iter().map(format).collect::<Result<Vec<_>, Failure>>()?;
-        files.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
+        let files = ProbeFiles::new(&bake.output)?;
+        files.plan(&mut outputs)?;
+        bake.parts.plan(&mut outputs)?;
         check_outputs(bake, "--probes", "-o probes.json")?;
         let options = LoadOptions { memory: bake.memory, ..LoadOptions::default() };
         let loaded = bake.load(&outputs, &options)?;
-        let cubes = files.iter().any(|(_, format)| *format == ProbeFormat::Ktx2);
+        // Parts have all that their merge may write.
+        let cubes = files.has_cubes() || bake.parts.is_part();
         let settings = ProbeSettings { size, bounds: self.bounds, cubes };
         let mut memory = memory(bake, &loaded);
         let before = memory.left();
@@ -49,19 +45,16 @@ impl ProbeArgs {
             Failure::new(format!("{}: too many probes: {why}", bake.scene.display()))
                 .advice("lower --probes, or raise --memory")
         })?;
-        let baked =
-            bake.bake(&loaded, grid.points(), (Some(memory.limit() + memory.left() - before), Vec::new()))?;
-        let probes = grid.probes(&baked);
-        for (path, format) in &files {
-            outputs.save_table(path, |out| write_probes(out, *format, &grid, &probes));
-        }
-        let inside = probes.iter().filter(|probe| !probe.is_valid).count();
+        let limit = Some(memory.limit() + memory.left() - before);
+        let baked = bake.bake(&loaded, grid.points(), (limit, grid.attachment()), 0.0)?;
+        baked.unsaved.iter().for_each(|why| outputs.fail(why.clone()));
+        let saved = files.save(&mut outputs, (&grid, &baked));
+        let text = format!("{saved}{}", bake.text(&baked));
         let object = || {
             let mut object = bake.object(&baked);
-            object["probes"] = json!({ "count": probes.len(), "inside": inside });
+            saved.add_to(&mut object);
             object
         };
-        let text = || format!("{} probes, {inside} inside bodies; {}", probes.len(), bake.text(&baked));
-        Ok(outputs.end_with(object, text, code(&baked)))
+        Ok(outputs.end_with(object, || text, code(&baked)))
     }
 }
