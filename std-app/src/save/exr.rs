@@ -18,6 +18,7 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::prelude::{Compression, LineOrder, WritableImage};
+use halflight_core::film::PixelWindow;
 use std::io::Cursor;
 
 /// Encoding of OpenEXR files.
@@ -48,6 +49,7 @@ pub struct ExrFile<'i> {
     image: &'i Image,
     layers: Channels<'i>,
     attributes: Vec<(String, Attribute)>,
+    window: Option<PixelWindow>,
 }
 
 impl<'i> ExrFile<'i> {
@@ -57,7 +59,13 @@ impl<'i> ExrFile<'i> {
             image,
             layers: Channels { list: Vec::new(), width: image.width as usize },
             attributes: Vec::new(),
+            window: None,
         }
+    }
+
+    /// Makes the picture a window of a larger one, which is the display window of the file.
+    pub fn set_window(&mut self, window: PixelWindow) {
+        self.window = Some(window);
     }
 
     /// Adds an attribute, or replaces the one of this name.
@@ -86,20 +94,27 @@ impl<'i> ExrFile<'i> {
     /// The bytes of the file.
     ///
     /// # Errors
-    /// A picture without pixels or with more than [`MAX_PIXELS`].
+    /// A picture without pixels or with more than [`MAX_PIXELS`], or of another size than its window.
     pub fn encode(self) -> Result<Vec<u8>, FileError> {
-        let Self { image, mut layers, attributes } = self;
+        let Self { image, mut layers, attributes, window } = self;
         let Image { width, height, pixels } = image;
         if pixels.is_empty() || pixels.len() > MAX_PIXELS {
             fail!("{width}x{height} pixels cannot be written");
         }
+        if let Some(size) = window.map(|window| window.size()).filter(|size| *size != [*width, *height]) {
+            fail!("{width}x{height} pixels are no window of {}x{} pixels", size[0], size[1]);
+        }
         let size = Vec2(*width as usize, *height as usize);
+        let [across, down] = window.map_or([*width, *height], |window| window.frame());
+        let [left, top] = window.map_or([0; 2], |window| window.corner());
         let channel = |channel: usize| -> Value { Box::new(move |pixel| pixels[pixel][channel]) };
         let colours = [("B", 2), ("G", 1), ("R", 0)].map(|(name, at)| (name.to_owned(), channel(at)));
         let picture = Channels { list: colours.into(), width: size.x() };
         layers.list.sort_by(|(a, _), (b, _)| a.as_bytes().cmp(b.as_bytes()));
-        let mut of_image = ImageAttributes::new(IntegerBounds::from_dimensions(size));
-        let mut of_part = LayerAttributes::default();
+        let mut of_image =
+            ImageAttributes::new(IntegerBounds::from_dimensions(Vec2(across as usize, down as usize)));
+        let position = Vec2(left as i32, top as i32);
+        let mut of_part = LayerAttributes { layer_position: position, ..LayerAttributes::default() };
         for (name, value) in attributes {
             // These have fields of their own, and no other place.
             match (name.as_str(), value) {
