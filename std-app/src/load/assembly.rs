@@ -63,6 +63,10 @@ impl SceneBuilder {
         let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
         let mut names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
+        // Instances may be solid where other triangles of a material are sheets.
+        let may_be_pane = |mtl: &MtlMaterial| prototypes.is_empty() && !mtl.exact && !mtl.surely_glass;
+        let may_be_panes: Vec<bool> = self.materials.iter().map(may_be_pane).collect();
+        open_glass::repair(&geometry, &may_be_panes, (&mut materials, &mut names), notes);
         let overlaps = repair(&mut geometry, (&mut materials, &mut names), notes);
         let mut instances = instances::Builder::default();
         for parts in &prototypes {
@@ -101,7 +105,7 @@ impl SceneBuilder {
     }
 }
 
-/// Repairs triangles in one plane; notes those, and dielectrics that are open. Returns the overlaps.
+/// Repairs triangles in one plane and notes them. Returns the overlaps.
 fn repair(geometry: &mut Geometry, (materials, names): Palette, notes: &mut Notes) -> Vec<Pair> {
     let mut overlaps = overlaps::locate(geometry, materials);
     if duplicate_emitters::remove(geometry, &overlaps, materials, names, notes) {
@@ -109,7 +113,6 @@ fn repair(geometry: &mut Geometry, (materials, names): Palette, notes: &mut Note
     }
     overlaps::note(&overlaps, &geometry.triangles, materials, names, notes);
     touching_glass::relate(geometry, &overlaps, materials, names, notes);
-    open_glass::note(geometry, materials, names, notes);
     overlaps
 }
 
