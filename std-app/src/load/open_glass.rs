@@ -2,7 +2,6 @@
 //! with glass. Flat sheets of an MTL become panes, other open glass is noted.
 
 use super::buffers::Geometry;
-use super::instances::Palette;
 use super::notes::Notes;
 use glam::Vec3;
 use halflight_core::scene::{Material, Surface};
@@ -19,7 +18,8 @@ const FLAT: f32 = 1e-4;
 pub(super) fn repair(
     geometry: &Geometry,
     may_be_panes: &[bool],
-    (materials, names): Palette,
+    materials: &mut [Material],
+    names: &[String],
     notes: &mut Notes,
 ) {
     let open = open(geometry, materials);

@@ -2,7 +2,8 @@
 //! entries are computed where a colour needs them. Between few entries the table differs from its formulas by
 //! up to 10 of 255 in dark channels of saturated colours.
 
-use super::view::GREY;
+/// Linear value of middle grey.
+pub(super) const GREY: f64 = 0.18;
 
 type Matrix = [[f32; 3]; 3];
 
@@ -25,7 +26,7 @@ const FROM_REC_2020: Matrix = [
 ];
 
 /// Luminances of the primaries.
-const REC_2020: [f32; 3] = [0.262_698_34, 0.677_999_66, 0.059_302];
+const REC_2020: [f32; 3] = [0.262_698_34, 0.677_999_7, 0.059_302];
 const SRGB: [f32; 3] = [0.212_672_9, 0.715_152_2, 0.072_175];
 
 /// Primaries moved inwards, by which bright colours lose their saturation; and back, less.

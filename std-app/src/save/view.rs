@@ -1,7 +1,7 @@
 //! View of a picture on a display: exposure, and a curve that brings bright colours into its range.
 
 use super::Image;
-use super::agx::agx;
+use super::agx::{GREY, agx};
 use core::str::FromStr;
 use std::borrow::Cow;
 
@@ -40,9 +40,6 @@ impl FromStr for Curve {
         }
     }
 }
-
-/// Linear value of middle grey.
-pub(super) const GREY: f64 = 0.18;
 
 /// Largest exposure of [`automatic_stops`], in either direction.
 const MOST_STOPS: f64 = 40.0;
