@@ -24,7 +24,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let [width, height]: [u32; 2] = [input.int_in_range(0..=3)?, input.int_in_range(0..=3)?];
     let floats = (0..input.int_in_range(0..=9)?).map(|_| point(input)).collect::<Result<Vec<_>>>()?;
     let bytes = input.arbitrary::<[[u8; 4]; 4]>()?;
-    let wrap = if input.arbitrary()? { Wrap::Repeat } else { Wrap::Clamp };
+    let wrap = if input.arbitrary()? { Wrap::REPEAT } else { Wrap::CLAMP };
     // A texture with fewer texels than its size promises is the caller's mistake, and must not crash.
     let textures = [Texels::Float(&floats), Texels::Srgb8(&bytes), Texels::Linear8(&bytes)]
         .map(|texels| Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY });

@@ -309,8 +309,9 @@ fn info_counts_what_is_there() {
         (Some(4), Some(2))
     );
     assert!(object["memory"]["bvh"].is_number() && !object["left_out"].as_array().unwrap().is_empty());
+    assert!(object["objects"].as_array().is_some_and(|names| !names.is_empty()), "{object}");
     let text = String::from_utf8(folder.run("info scene.obj").stdout).unwrap();
-    assert!(text.contains("triangles") && text.contains("left out"), "{text}");
+    assert!(text.contains("objects") && text.contains("triangles") && text.contains("left out"), "{text}");
 }
 
 /// Ctrl-C, as a terminal sends it.

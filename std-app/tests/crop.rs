@@ -71,6 +71,15 @@ fn files_have_the_window_and_the_object_its_place() {
         let from = 12 * ((48 - 35 + row) * 64 + 20);
         assert!(*pixels == whole[from..from + 12 * 30], "row {row}");
     }
+    // An OpenEXR file has the window in its place, with its layers: the display window is the whole picture.
+    folder.object(&format!("{all} -o part.exr --crop 20,10,30x25 --aov samples --json"));
+    let placed = halflight::save::read(&folder.path("part.exr")).unwrap();
+    assert_eq!([placed.width, placed.height], [64, 48]);
+    let whole = halflight::save::read(&folder.path("whole.pfm")).unwrap();
+    for (i, (pixel, of_whole)) in (0..).zip(placed.pixels.iter().zip(&whole.pixels)) {
+        let is_in = (20..50).contains(&(i % 64)) && (10..35).contains(&(i / 64));
+        assert_eq!(*pixel, if is_in { *of_whole } else { [0.0; 3] }, "pixel {i}");
+    }
     for (window, message) in [
         ("60,10,5x5", "is not within the picture"),
         ("0,0,0x5", "a corner and a size in pixels are expected"),

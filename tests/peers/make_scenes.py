@@ -157,6 +157,18 @@ def rough_glass():
     model.write("rough-glass")
 
 
+def pane():
+    """Thin panes across the room and beside each other, in front of boxes and below the lamp."""
+    model = Model()
+    model.room(lamp=0.9)
+    boxes(model)
+    model.use("pane", "Kd 0 0 0\nNi 1.5\nillum 7")
+    model.quad([-1, 0.4, 0.9], [1.2, 0, 0], [0, 0.1, -1.8])
+    model.quad([-0.1, -0.9, 0.9], [0.9, 0, -0.3], [0, 1.1, 0])
+    model.quad([-0.1, -0.7, 0.7], [0.9, 0, -0.3], [0, 1.1, 0])
+    model.write("pane", material={"pane": {"kind": "pane"}})
+
+
 def metal():
     model = Model()
     model.room()
@@ -380,7 +392,7 @@ def rings():
     model.write("rings", HARD)
 
 
-SCENES = [diffuse, mirror, glass, rough_glass, metal, plastic, varnish, textured, point, spot, directional]
+SCENES = [diffuse, mirror, glass, rough_glass, pane, metal, plastic, varnish, textured, point, spot, directional]
 SCENES += [constant, lens, many_lights, bent_normals, smooth_normals]
 SCENES += [up_light, glass_lamp, keyhole, mirror_ball, glass_ball, rings]
 

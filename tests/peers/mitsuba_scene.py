@@ -28,6 +28,8 @@ def mitsuba_scene(description, folder, source=False):
         for i, part in enumerate(parts):
             material = materials[part.material]
             bsdf = source_bsdf(material, textures) if source else mtl_bsdf(material, textures)
+            if description.get("material", {}).get(part.material, {}).get("kind") == "pane":
+                bsdf = {"type": "thindielectric", "int_ior": material["Ni"][0], "ext_ior": 1.0}
             scene[f"mesh {len(scene)} {i}"] = _mesh(part, bsdf, material, textures)
     for i, light in enumerate(description.get("light", [])):
         scene[f"light {i}"] = _light(light)

@@ -68,7 +68,7 @@ fn a_panorama_of_an_environment_is_its_map() {
         width: WIDTH,
         height: HEIGHT,
         texels: Texels::Float(&texels),
-        wrap: Wrap::Repeat,
+        wrap: Wrap::REPEAT,
         transform: TextureTransform::IDENTITY,
     };
     // The middle of a map is −x.

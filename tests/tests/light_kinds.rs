@@ -27,7 +27,7 @@ fn sky() -> Stage {
         width: 16,
         height: 8,
         texels: Texels::Float(&SKY),
-        wrap: Wrap::Repeat,
+        wrap: Wrap::REPEAT,
         transform: TextureTransform::IDENTITY,
     };
     let to_map = Mat3::from_cols(Vec3::new(0.0, 0.0, 1.0), Vec3::X, Vec3::Y);
@@ -290,7 +290,7 @@ fn a_textured_lamp_sends_what_its_texels_say() {
         width: 2,
         height: 2,
         texels: Texels::Float(&CHECKER),
-        wrap: Wrap::Clamp,
+        wrap: Wrap::CLAMP,
         transform: TextureTransform::IDENTITY,
     }];
     stage.materials[0].emission.texture = Some(TextureId(0));

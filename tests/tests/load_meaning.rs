@@ -300,6 +300,37 @@ fn open_glass_is_said() {
 }
 
 #[test]
+fn flat_sheets_of_glass_are_panes() {
+    let points = "v 0 0 0\nv 2 0 1\nv 2 1 1\nv 0 1 0\nv 0 0 5\nv 3 0 5\nv 0 2 5\nv 3 2 5.2\n";
+    let of = |faces: &str, mtl: &str| {
+        let found = scene(&format!("{points}usemtl a\n{faces}"), &format!("illum 7\n{mtl}"));
+        found.unwrap()
+    };
+    let is_pane = |scene: &LoadedScene| matches!(scene.materials[0].surface, Surface::Pane { .. });
+    for faces in ["f 1 2 3 4\n", "f 1 2 3 4\nf 5 6 7\n", "f 1 2 3\nf 3 2 1\n"] {
+        let sheets = of(faces, "Ni 1.5\nTf 0.5 0.6 0.7\n");
+        says(&sheets, &["glass `a` is flat sheets", "thin panes"]);
+        let Surface::Pane { ior, tint } = sheets.materials[0].surface else { panic!("{faces}") };
+        assert_eq!((ior, tint), (1.5, Rgb::new(0.5, 0.6, 0.7)));
+    }
+    // Water, frosted glass, a bent sheet.
+    for (faces, mtl) in
+        [("f 1 2 3 4\n", "Ni 1.33\n"), ("f 1 2 3 4\n", "Ni 1.5\nPr 0.3\n"), ("f 5 6 8 7\n", "Ni 1.5\n")]
+    {
+        let solid = of(faces, mtl);
+        assert!(!is_pane(&solid), "{faces} {mtl}");
+        says(&solid, &["glass `a` is open", "`kind = \"pane\"`"]);
+    }
+    let obj = format!("mtllib m.mtl\n{points}usemtl a\nf 1 2 3 4\n");
+    let files = [
+        ("q.obj", obj.as_bytes()),
+        ("m.mtl", b"newmtl a\nillum 7\nNi 1.5\n"),
+        ("s.toml", b"[[mesh]]\nfile = \"q.obj\"\n[material.a]\nkind = \"glass\"\n"),
+    ];
+    assert!(!is_pane(&Files::new(&files).load("s.toml").unwrap()), "a scene file decides");
+}
+
+#[test]
 fn a_scene_file_overrides_what_illum_says() {
     let mtl = "newmtl a\nKd 0.5 0.5 0.5\nillum 1\n";
     let obj = format!("mtllib m.mtl\n{SQUARE}{FACE}");

@@ -100,7 +100,7 @@ mod tests {
     fn texture(texels: &[[f32; 3]]) -> Texture<'_> {
         let (width, height) = (texels.len() as u32, 1);
         let transform = TextureTransform::IDENTITY;
-        Texture { width, height, texels: Texels::Float(texels), wrap: Wrap::Repeat, transform }
+        Texture { width, height, texels: Texels::Float(texels), wrap: Wrap::REPEAT, transform }
     }
 
     #[test]

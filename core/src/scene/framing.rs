@@ -25,8 +25,10 @@ const VIEWS: [(Vec3, Vec3); 6] = [
 /// Side in pixels of the pictures that rate the views.
 const GRID: usize = 24;
 
-/// Factor by which a later view must exceed an earlier one.
+/// Factor by which a later view must exceed an earlier one, and the front: glTF and exporters of OBJ turn the
+/// front of a model towards +z.
 const PREFERENCE_FACTOR: f32 = 1.05;
+const FRONT_FACTOR: f32 = 1.3;
 
 /// Weight of a vertical view, because most scenes stand upright.
 const VERTICAL_WEIGHT: f32 = 0.6;
@@ -44,8 +46,9 @@ impl Camera {
             let camera = in_front_of(&bounds, forward, up);
             let weight = if forward.y == 0.0 { 1.0 } else { VERTICAL_WEIGHT };
             let seen = weight * visible_area(&camera, mesh, &bounds);
-            if seen > PREFERENCE_FACTOR * best.0 {
-                best = (seen, camera);
+            if seen > best.0 {
+                let factor = if forward == VIEWS[0].0 { FRONT_FACTOR } else { PREFERENCE_FACTOR };
+                best = (factor * seen, camera);
             }
         }
         best.1
@@ -151,6 +154,18 @@ mod tests {
             let inside = |raster: Vec2| raster.cmpgt(Vec2::ZERO).all() && raster.max_element() < 100.0;
             assert!(corner.is_some_and(|corner| inside(corner.raster)));
         }
+    }
+
+    #[test]
+    fn a_relief_before_a_plate_is_seen_from_its_front() {
+        // From behind the plate hides all: its area alone is a little larger.
+        let square =
+            |half: f32, z: f32| [[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]];
+        let positions: Vec<[f32; 3]> = [square(1.0, 0.0), square(0.8, 0.3)].into_iter().flatten().collect();
+        let faces = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        let triangles = faces.map(|vertices| Triangle { vertices, material: 0 });
+        let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
+        assert_eq!(Camera::framing(&mesh).forward, Vec3::NEG_Z);
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub use mesh::{Instances, Mesh, Triangle};
 pub use overlap::Overlap;
 pub use surface::SurfacePoint;
 pub(crate) use texture::load;
-pub use texture::{Texels, Texture, TextureId, TextureTransform, Wrap};
+pub use texture::{Texels, Texture, TextureEdge, TextureId, TextureTransform, Wrap};
 
 /// Everything that a picture shows.
 #[derive(Clone, Copy, Debug)]

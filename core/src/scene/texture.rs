@@ -23,13 +23,27 @@ pub enum Texels<'a> {
     Number(&'a [f32]),
 }
 
-/// Lookup beyond the edge.
+/// Lookup beyond the edges of a side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wrap {
+pub enum TextureEdge {
     /// Repeats the texture.
     Repeat,
     /// Extends the border.
     Clamp,
+    /// Repeats the texture, every other time mirrored.
+    Mirror,
+}
+
+/// Lookup beyond the edges along u and v.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wrap(pub [TextureEdge; 2]);
+
+impl Wrap {
+    /// Repeats the texture along both sides.
+    pub const REPEAT: Self = Self([TextureEdge::Repeat; 2]);
+
+    /// Extends the border of all four edges.
+    pub const CLAMP: Self = Self([TextureEdge::Clamp; 2]);
 }
 
 /// Map from texture coordinates `uv` of a surface to those of the texture: `scale * uv + offset`.
@@ -60,7 +74,7 @@ pub struct Texture<'a> {
     pub height: u32,
     /// `width * height` texels.
     pub texels: Texels<'a>,
-    /// Lookup beyond the edge.
+    /// Lookup beyond the edges.
     pub wrap: Wrap,
     /// Map from the texture coordinates of a surface to those of the texture.
     pub transform: TextureTransform,
@@ -77,8 +91,9 @@ impl Texture<'_> {
     /// Linear RGBA at texture coordinates of the texture itself.
     #[inline]
     fn between(&self, uv: Vec2) -> [f32; 4] {
-        let (x0, x1, fx) = self.wrap.neighbours(uv.x, self.width);
-        let (y0, y1, fy) = self.wrap.neighbours(1.0 - uv.y, self.height);
+        let Wrap([of_u, of_v]) = self.wrap;
+        let (x0, x1, fx) = of_u.neighbours(uv.x, self.width);
+        let (y0, y1, fy) = of_v.neighbours(1.0 - uv.y, self.height);
         let (top, bottom) = (y0 as usize * self.width as usize, y1 as usize * self.width as usize);
         let (x0, x1) = (x0 as usize, x1 as usize);
         let [a, b, c, d] = self.four([top + x0, top + x1, bottom + x0, bottom + x1]);
@@ -91,13 +106,15 @@ impl Texture<'_> {
     pub(crate) fn put(&self, block: &mut TextureBlock, i: usize, uv: Vec2) -> Option<(&[[u8; 4]], usize)> {
         const SIZES: RangeInclusive<u32> = 1..=MAX_SIZE;
         let Texels::Srgb8(texels) = self.texels else { return None };
-        if !(SIZES.contains(&self.width) && SIZES.contains(&self.height)) {
+        let clamps = self.wrap == Wrap::CLAMP;
+        let has_wrap = clamps || self.wrap == Wrap::REPEAT;
+        if !(has_wrap && SIZES.contains(&self.width) && SIZES.contains(&self.height)) {
             return None;
         }
         let (uv, i) = (self.transform.at(uv), i & 15);
         (block.at[0][i], block.at[1][i]) = (uv.x, 1.0 - uv.y);
         (block.size[0][i], block.size[1][i]) = (self.width as f32, self.height as f32);
-        block.clamps = block.clamps & !(1 << i) | u32::from(self.wrap == Wrap::Clamp) << i;
+        block.clamps = block.clamps & !(1 << i) | u32::from(clamps) << i;
         Some((texels, self.width as usize))
     }
 
@@ -163,7 +180,7 @@ pub(crate) fn load(block: &mut TextureBlock, i: usize, (texels, width): (&[[u8; 
     put(&mut block.texels[3], i, texel(bottom + right));
 }
 
-impl Wrap {
+impl TextureEdge {
     /// The two texels around coordinate `x` (0 … 1 spans `size` texels), and the weight of the second.
     #[inline]
     fn neighbours(self, x: f32, size: u32) -> (u32, u32, f32) {
@@ -172,7 +189,11 @@ impl Wrap {
         let x = if x.abs() < WHOLE { x } else { 0.0 };
         let last = size.saturating_sub(1);
         match self {
-            Wrap::Repeat => {
+            TextureEdge::Mirror => {
+                let in_pair = x - 2.0 * floor(0.5 * x);
+                TextureEdge::Clamp.neighbours(in_pair.min(2.0 - in_pair), size)
+            }
+            TextureEdge::Repeat => {
                 let texel = (x - floor(x)) * size as f32 - 0.5;
                 let below = floor(texel);
                 let index = below as i32;
@@ -180,7 +201,7 @@ impl Wrap {
                 let second = if first == last { 0 } else { first + 1 };
                 (first, second, texel - below)
             }
-            Wrap::Clamp => {
+            TextureEdge::Clamp => {
                 let texel = (x.clamp(0.0, 1.0) * size as f32 - 0.5).clamp(0.0, last as f32);
                 let first = (texel as u32).min(last);
                 (first, (first + 1).min(last), texel - first as f32)
@@ -240,7 +261,7 @@ mod tests {
 
     #[test]
     fn texel_centres_are_exact_and_v_points_up() {
-        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+        for wrap in [Wrap::REPEAT, Wrap::CLAMP] {
             let t = texture(wrap);
             assert_eq!(t.lookup(Vec2::new(0.25, 0.75)), [1.0, 0.0, 0.0, 1.0]);
             assert_eq!(t.lookup(Vec2::new(0.75, 0.75)), [0.0, 1.0, 0.0, 1.0]);
@@ -251,10 +272,28 @@ mod tests {
 
     #[test]
     fn edges_repeat_or_hold() {
-        assert_eq!(texture(Wrap::Repeat).lookup(Vec2::new(0.0, 0.75)), [0.5, 0.5, 0.0, 1.0]);
-        assert_eq!(texture(Wrap::Repeat).lookup(Vec2::new(-2.75, 3.75)), [1.0, 0.0, 0.0, 1.0]);
-        assert_eq!(texture(Wrap::Clamp).lookup(Vec2::new(-5.0, 0.75)), [1.0, 0.0, 0.0, 1.0]);
-        assert_eq!(texture(Wrap::Clamp).lookup(Vec2::new(9.0, -9.0)), [1.0, 1.0, 1.0, 1.0]);
+        assert_eq!(texture(Wrap::REPEAT).lookup(Vec2::new(0.0, 0.75)), [0.5, 0.5, 0.0, 1.0]);
+        assert_eq!(texture(Wrap::REPEAT).lookup(Vec2::new(-2.75, 3.75)), [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(texture(Wrap::CLAMP).lookup(Vec2::new(-5.0, 0.75)), [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(texture(Wrap::CLAMP).lookup(Vec2::new(9.0, -9.0)), [1.0, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn sides_wrap_in_their_own_ways() {
+        let mirrored = texture(Wrap([TextureEdge::Mirror; 2]));
+        let at = |u, v| mirrored.lookup(Vec2::new(u, v));
+        for (u, v) in [(0.25, 0.75), (0.4, 0.9), (0.0, 1.0), (0.93, 0.31)] {
+            let same = [(-u, v), (2.0 - u, v), (u + 2.0, v - 4.0), (u, 2.0 - v), (-u, -v)];
+            for (u2, v2) in same {
+                let difference = Vec4::from(at(u, v)).distance(at(u2, v2).into());
+                assert!(difference < 1e-5, "{u} {v}, {u2} {v2}");
+            }
+        }
+        // The border is one texel wide, as if clamped.
+        assert_eq!(at(0.0, 0.75), [1.0, 0.0, 0.0, 1.0]);
+        let mixed = texture(Wrap([TextureEdge::Clamp, TextureEdge::Repeat]));
+        assert_eq!(mixed.lookup(Vec2::new(9.0, 3.75)), [0.0, 1.0, 0.0, 1.0]);
+        assert_eq!(mixed.lookup(Vec2::new(-1.0, -1.75)), [0.0, 0.0, 1.0, 1.0]);
     }
 
     #[test]
@@ -265,7 +304,7 @@ mod tests {
             assert_eq!(linear, expected as f32, "{byte}");
         }
         let texels = [[188, 0, 255, 51]];
-        let t = Texture { width: 1, height: 1, texels: Texels::Srgb8(&texels), ..texture(Wrap::Repeat) };
+        let t = Texture { width: 1, height: 1, texels: Texels::Srgb8(&texels), ..texture(Wrap::REPEAT) };
         let [r, g, b, a] = t.lookup(Vec2::ZERO);
         assert!((r - 0.502_886).abs() < 1e-5 && g == 0.0 && b == 1.0 && a == 0.2);
         let t = Texture { texels: Texels::Linear8(&texels), ..t };
@@ -275,7 +314,7 @@ mod tests {
     #[test]
     fn a_ramp_has_a_constant_slope() {
         let ramp: [[f32; 3]; 32] = core::array::from_fn(|i| [(i % 8) as f32 * 0.5 - (i / 8) as f32; 3]);
-        let t = Texture { width: 8, height: 4, texels: Texels::Float(&ramp), ..texture(Wrap::Clamp) };
+        let t = Texture { width: 8, height: 4, texels: Texels::Float(&ramp), ..texture(Wrap::CLAMP) };
         let slope = t.gradient(Vec2::new(0.5, 0.5));
         // Half a unit per texel, 8 texels per unit of u; minus one per row downwards, 4 rows per unit of v.
         assert!(slope.distance(Vec2::new(4.0, 4.0)) < 1e-4, "{slope}");
@@ -283,7 +322,7 @@ mod tests {
 
     #[test]
     fn a_texture_lies_where_its_transform_says() {
-        let plain = texture(Wrap::Repeat);
+        let plain = texture(Wrap::REPEAT);
         let (scale, offset) = (Vec2::new(-2.0, 4.0), Vec2::new(0.25, -0.5));
         let moved = Texture { transform: TextureTransform { scale, offset }, ..plain };
         for uv in [Vec2::ZERO, Vec2::new(0.125, 0.75), Vec2::new(-3.375, 0.0625)] {
@@ -297,7 +336,7 @@ mod tests {
         let texels: [[u8; 4]; 15] = core::array::from_fn(|i| [17 * i as u8, 90 + 11 * i as u8, i as u8, 0]);
         let transform = TextureTransform { scale: Vec2::new(-1.5, 2.0), offset: Vec2::new(0.125, 0.0) };
         let random = Random::new(3, 0);
-        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+        for wrap in [Wrap::REPEAT, Wrap::CLAMP] {
             // The last one lacks texels.
             for (width, height) in [(5, 3), (3, 5), (1, 15), (15, 1), (8, 8)] {
                 let t = Texture { width, height, texels: Texels::Srgb8(&texels), wrap, transform };
@@ -324,7 +363,7 @@ mod tests {
         let wild =
             [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, 8_388_607.5, -1e-9, 1.0 - 1e-8, 0.0];
         let sizes = [(2, 2), (0, 0), (1, 0), (u32::MAX, 1), (1, u32::MAX), (3, 2)];
-        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+        for wrap in [Wrap::REPEAT, Wrap::CLAMP, Wrap([TextureEdge::Mirror, TextureEdge::Clamp])] {
             for (width, height) in sizes {
                 let t = Texture { width, height, ..texture(wrap) };
                 for u in wild {
@@ -339,7 +378,7 @@ mod tests {
                 }
             }
         }
-        let none = Texture { width: 4, height: 4, texels: Texels::Float(&[]), ..texture(Wrap::Repeat) };
+        let none = Texture { width: 4, height: 4, texels: Texels::Float(&[]), ..texture(Wrap::REPEAT) };
         assert_eq!(none.lookup(Vec2::splat(0.3)), [1.0; 4]);
     }
 }

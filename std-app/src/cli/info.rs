@@ -55,6 +55,7 @@ impl Info {
             sun: scene.environment.as_ref().and_then(SunFacts::new),
             counts: counts(&census, &scene),
             cameras: &loaded.cameras,
+            objects: &loaded.object_names,
             repairs: &loaded.repairs,
         };
         print_result(&if self.json { facts.object().to_string() } else { facts.text() })?;
@@ -117,6 +118,7 @@ fn name_of(kind: ViewKind) -> &'static str {
 
 struct Facts<'a> {
     cameras: &'a [NamedCamera],
+    objects: &'a [String],
     repairs: &'a [String],
     camera: CameraFacts,
     sun: Option<SunFacts>,
@@ -145,10 +147,19 @@ impl Facts<'_> {
             "camera": camera,
             "sun": self.sun.as_ref().map(|sun| json!({ "elevation": sun.elevation, "azimuth": sun.azimuth })),
             "cameras": self.cameras.iter().map(|camera| camera.name.as_str()).collect::<Value>(),
+            "objects": self.objects,
             "memory": memory.collect::<Map<_, _>>(),
             "left_out": left_out_array(self.plan.left_out()),
             "repairs": self.repairs,
         })
+    }
+
+    /// The number of objects, and the names of the first ones.
+    fn object_names(&self) -> String {
+        const SHOWN: usize = 8;
+        let (count, shown) = (self.objects.len(), self.objects.iter().take(SHOWN));
+        let names: Vec<&str> = shown.map(String::as_str).collect();
+        format!("{count}: {}{}", names.join(", "), if count > SHOWN { ", ..." } else { "" })
     }
 
     fn text(&self) -> String {
@@ -156,6 +167,7 @@ impl Facts<'_> {
         let mut lines = vec!["scene".to_string()];
         let counts = self.counts.iter().filter(|(_, count)| *count > 0);
         lines.extend(counts.map(|(name, count)| line(name, count.to_string())));
+        lines.push(line("objects", self.object_names()));
         lines.push("camera".into());
         lines.extend(self.camera.vectors.iter().map(|(name, vector)| {
             // Adding zero turns −0 into 0.

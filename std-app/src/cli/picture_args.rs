@@ -375,7 +375,10 @@ pub(super) fn file_name(scene: &Path) -> String {
 pub(super) fn note_darkness(scene: &Scene) -> bool {
     let is_dark = scene.is_dark();
     if is_dark {
-        print_note("nothing in this scene emits light: the picture is black. Add a light or an environment");
+        print_note(
+            "nothing in this scene emits light: the picture is black. Add a light or an environment: the lines \
+             `[[mesh]]`, `file = \"MODEL\"`, `[sky]`, `sun = [1, 2, 1]` are a scene file in daylight",
+        );
     }
     is_dark
 }

@@ -3,6 +3,7 @@
 use crate::provenance::Provenance;
 use crate::render::{ErrorEstimate, Merged, RenderResult, Settings};
 use crate::save::{Attribute, ExrFile};
+use halflight_core::film::PixelWindow;
 use halflight_core::findings::{Decision, Findings};
 
 /// Facts of a picture.
@@ -20,6 +21,8 @@ pub struct Facts<'a> {
     pub error: Option<ErrorEstimate>,
     /// Seconds of rendering.
     pub seconds: f64,
+    /// Window of the picture that was rendered; `None`: all.
+    pub window: Option<PixelWindow>,
     /// Decisions of the render.
     pub findings: &'a Findings,
     /// Command, program, machine and date.
@@ -40,6 +43,7 @@ impl<'a> Facts<'a> {
             spp: result.spp,
             error: result.error,
             seconds: result.seconds.render,
+            window: settings.shard.window,
             findings: &result.findings,
             provenance,
         }
@@ -55,14 +59,16 @@ impl<'a> Facts<'a> {
             spp: *spp,
             error: *error,
             seconds: *seconds,
+            window: None,
             findings,
             provenance,
         }
     }
 
-    /// Adds the attributes to a file.
+    /// Adds the attributes to a file, and the place of its picture.
     pub fn add_to(&self, file: &mut ExrFile) {
-        let Self { scene, method, seed, spp, error, seconds, findings, provenance } = self;
+        let Self { scene, method, seed, spp, error, seconds, window, findings, provenance } = self;
+        window.iter().for_each(|window| file.set_window(*window));
         let text = |text: &str| Attribute::Text(text.to_owned());
         let integer = |number: u32| Attribute::Integer(i32::try_from(number).unwrap_or(i32::MAX));
         file.set("software", text(provenance.version));

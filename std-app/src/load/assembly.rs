@@ -36,8 +36,7 @@ impl SceneBuilder {
             Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
         };
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
-        let given = &self.given;
-        let resolved = |(number, mtl): (u32, &MtlMaterial)| match given.get(&number) {
+        let resolved = |(number, mtl): (u32, &MtlMaterial)| match self.given.get(&number) {
             Some(material) => *material,
             None => surface::resolve(mtl, &mut textures, notes),
         };
@@ -63,7 +62,8 @@ impl SceneBuilder {
         let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
         let mut names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
-        let overlaps = repair(&mut geometry, (&mut materials, &mut names), notes);
+        let panes = may_be_panes(&self.materials, !prototypes.is_empty());
+        let overlaps = repair(&mut geometry, &panes, (&mut materials, &mut names), notes);
         let mut instances = instances::Builder::default();
         for parts in &prototypes {
             instances.add(parts, (&mut materials, &mut names), notes);
@@ -101,15 +101,27 @@ impl SceneBuilder {
     }
 }
 
-/// Repairs triangles in one plane; notes those, and dielectrics that are open. Returns the overlaps.
-fn repair(geometry: &mut Geometry, (materials, names): Palette, notes: &mut Notes) -> Vec<Pair> {
+/// True for materials whose flat sheets may be panes. Instances may be solid where other triangles of a
+/// material are sheets.
+fn may_be_panes(materials: &[MtlMaterial], has_instances: bool) -> Vec<bool> {
+    let may_be = |mtl: &MtlMaterial| !has_instances && !mtl.exact && !mtl.surely_glass;
+    materials.iter().map(may_be).collect()
+}
+
+/// Repairs open glass and triangles in one plane, and notes them. Returns the overlaps.
+fn repair(
+    geometry: &mut Geometry,
+    may_be_panes: &[bool],
+    (materials, names): Palette,
+    notes: &mut Notes,
+) -> Vec<Pair> {
+    open_glass::repair(geometry, may_be_panes, materials, names, notes);
     let mut overlaps = overlaps::locate(geometry, materials);
     if duplicate_emitters::remove(geometry, &overlaps, materials, names, notes) {
         overlaps = overlaps::locate(geometry, materials);
     }
     overlaps::note(&overlaps, &geometry.triangles, materials, names, notes);
     touching_glass::relate(geometry, &overlaps, materials, names, notes);
-    open_glass::note(geometry, materials, names, notes);
     overlaps
 }
 

@@ -177,10 +177,10 @@ impl Builder {
         let (min, max) = bounds(parts);
         let transform = SceneTransform::fitting(min.into(), max.into());
         let mut geometry = geometry::assemble(parts, &Fit { transform, is_far: false }, 0.0, notes);
+        open_glass::repair(&geometry, &[], materials, names, notes);
         let pairs = overlaps::locate(&geometry, materials);
         overlaps::note(&pairs, &geometry.triangles, materials, names, notes);
         touching_glass::relate(&mut geometry, &pairs, materials, names, notes);
-        open_glass::note(&geometry, materials, names, notes);
         self.append(geometry, &overlaps::both_orders(&pairs));
         self.transforms.push(transform);
     }

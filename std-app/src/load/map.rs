@@ -5,6 +5,7 @@ use super::files::{Found, Lookup};
 use super::name::{Name, unquoted, without_comments};
 use super::notes::Notes;
 use super::text::{self, is_blank, trimmed, word_starts};
+use halflight_core::scene::Wrap;
 use std::path::{Path, PathBuf};
 
 /// A texture statement.
@@ -36,8 +37,8 @@ pub struct MapOptions {
     pub scale: [f64; 2],
     /// `-o u v`.
     pub offset: [f64; 2],
-    /// `-clamp on`.
-    pub clamp: bool,
+    /// `-clamp on`, or the sampler of glTF.
+    pub wrap: Wrap,
     /// `-bm`.
     pub bump_multiplier: Option<f64>,
     /// `-imfchan r|g|b|m|l`: the channel of a scalar map or of heights.
@@ -53,7 +54,7 @@ impl Default for MapOptions {
         Self {
             scale: [1.0; 2],
             offset: [0.0; 2],
-            clamp: false,
+            wrap: Wrap::REPEAT,
             bump_multiplier: None,
             channel: None,
             threshold: None,
@@ -251,7 +252,8 @@ fn option(tokens: &[Token], at: usize, options: &mut MapOptions) -> Option<usize
             numbers.len()
         }
         b"clamp" => {
-            options.clamp = value.eq_ignore_ascii_case(b"on");
+            let is_on = value.eq_ignore_ascii_case(b"on");
+            options.wrap = if is_on { Wrap::CLAMP } else { Wrap::REPEAT };
             switch
         }
         b"imfchan" => {
@@ -312,7 +314,7 @@ mod tests {
     #[test]
     fn options_precede_or_follow_the_name() {
         let expected =
-            MapOptions { scale: [2.0, 3.0], offset: [0.5, 0.0], clamp: true, ..Default::default() };
+            MapOptions { scale: [2.0, 3.0], offset: [0.5, 0.0], wrap: Wrap::CLAMP, ..Default::default() };
         for operand in [
             "-s 2 3 1 -o 0.5 -clamp on dark wood.png",
             "dark wood.png -s 2 3 1 -o 0.5 -clamp on",

@@ -1,35 +1,105 @@
-//! Notes on open glass: the inside of a dielectric lies behind its faces, so a single pane fills half of the
-//! space with glass.
+//! Open glass: the inside of a dielectric lies behind its faces, so a single sheet fills half of the space
+//! with glass. Flat sheets of an MTL become panes, other open glass is noted.
 
 use super::buffers::Geometry;
 use super::notes::Notes;
+use glam::Vec3;
 use halflight_core::scene::{Material, Surface};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-/// Notes glass with edges of one face only, counting faces of all materials.
-pub(super) fn note(geometry: &Geometry, materials: &[Material], names: &[String], notes: &mut Notes) {
+/// Least index of sheets that are panes: water has 1.33, and its surface is a flat sheet of glass too.
+const SOLID: f32 = 1.4;
+
+/// Distance of the points of a flat sheet from its plane, in lengths of the largest side of its triangles.
+const FLAT: f32 = 1e-4;
+
+/// Finds glass with edges of one face only, counting faces of all materials. It becomes panes if
+/// `may_be_panes` has its material and all pieces of that are flat; else it is noted.
+pub(super) fn repair(
+    geometry: &Geometry,
+    may_be_panes: &[bool],
+    materials: &mut [Material],
+    names: &[String],
+    notes: &mut Notes,
+) {
+    let open = open(geometry, materials);
+    for (material, (count, roots, pieces)) in open {
+        let name = &names[material as usize];
+        let may_be_pane = may_be_panes.get(material as usize) == Some(&true) && roots.len() == pieces;
+        if may_be_pane && is_flat(geometry, material) {
+            let Surface::Dielectric { ior, tint, roughness } = materials[material as usize].surface else {
+                continue;
+            };
+            if ior >= SOLID && roughness == 0.0.into() {
+                materials[material as usize].surface = Surface::Pane { ior, tint };
+                let what = format!(
+                    "glass `{name}` is flat sheets without an inside: they are thin panes; \
+                     `kind = \"glass\"` in a scene file keeps them solid"
+                );
+                notes.add(1, what);
+                continue;
+            }
+        }
+        let what = format!(
+            "glass `{name}` is open ({count} edges of one face, in {} of its pieces): everything \
+             behind it is its inside; `kind = \"pane\"` in a scene file makes it thin",
+            roots.len()
+        );
+        notes.add(1, what);
+    }
+}
+
+/// True if the triangles of `material` that share corners lie in one plane each.
+fn is_flat(geometry: &Geometry, material: u32) -> bool {
+    let position = |v: u32| Vec3::from(geometry.positions[v as usize]);
+    let mut planes: HashMap<[u32; 3], (Vec3, Vec3)> = HashMap::new();
+    let bits = |p: Vec3| (p + 0.0).to_array().map(f32::to_bits);
+    geometry.triangles.iter().filter(|t| t.material == material).all(|triangle| {
+        let corners = triangle.vertices.map(position);
+        let [along, across] = [corners[1] - corners[0], corners[2] - corners[0]];
+        let normal = along.cross(across).normalize_or_zero();
+        let size = along.length().max(across.length());
+        // Every corner has a plane of the triangles around it: neighbours hand it on.
+        corners.iter().all(|&corner| {
+            let (origin, of_corner) = *planes.entry(bits(corner)).or_insert((corners[0], normal));
+            corners.iter().all(|&other| of_corner.dot(other - origin).abs() <= FLAT * size)
+        })
+    })
+}
+
+/// Number of open edges of each glass, roots of the pieces that have them, and number of all its pieces.
+fn open(geometry: &Geometry, materials: &[Material]) -> BTreeMap<u32, (u64, BTreeSet<u32>, usize)> {
     let is_glass = |t: u32| matches!(materials[t as usize].surface, Surface::Dielectric { .. });
     if !(0..materials.len() as u32).any(is_glass) {
-        return;
+        return BTreeMap::new();
     }
     // Corners at the same position are one, regardless of normals and texture coordinates.
     let mut points: HashMap<[u32; 3], u32> = HashMap::new();
     let position = |v: u32| geometry.positions[v as usize].map(|x| (x + 0.0).to_bits());
     let mut pieces = Pieces::default();
     let mut edges: HashMap<[u32; 2], (u32, u32)> = HashMap::new();
+    // The two faces of a sheet that has both enclose nothing.
+    let mut faces: HashSet<[u32; 3]> = HashSet::new();
+    let mut corner_of: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
     for triangle in geometry.triangles.iter().filter(|t| is_glass(t.material)) {
         let corners = triangle.vertices.map(|v| {
             let next = points.len() as u32;
             *points.entry(position(v)).or_insert(next)
         });
         pieces.join(corners);
+        corner_of.entry(triangle.material).or_default().insert(corners[0]);
+        let mut face = corners;
+        face.sort_unstable();
+        if !faces.insert(face) {
+            continue;
+        }
         for edge in edges_of(corners) {
             edges.entry(edge).or_insert((0, triangle.material)).0 += 1;
         }
     }
     edges.retain(|_, (faces, _)| *faces == 1);
     if edges.is_empty() {
-        return;
+        return BTreeMap::new();
     }
     for triangle in geometry.triangles.iter().filter(|t| !is_glass(t.material)) {
         let corners = triangle.vertices.map(|v| points.get(&position(v)).copied());
@@ -39,20 +109,17 @@ pub(super) fn note(geometry: &Geometry, materials: &[Material], names: &[String]
             }
         }
     }
-    let mut open: BTreeMap<u32, (u64, BTreeSet<u32>)> = BTreeMap::new();
+    let mut open: BTreeMap<u32, (u64, BTreeSet<u32>, usize)> = BTreeMap::new();
     for (edge, (_, material)) in edges {
-        let (count, roots) = open.entry(material).or_default();
+        let (count, roots, _) = open.entry(material).or_default();
         *count += 1;
         roots.insert(pieces.root(edge[0]));
     }
-    for (material, (count, roots)) in open {
-        let (name, pieces) = (&names[material as usize], roots.len());
-        let what = format!(
-            "glass `{name}` is open ({count} edges of one face, in {pieces} of its pieces): everything \
-             behind it is its inside; a pane needs two faces"
-        );
-        notes.add(1, what);
+    for (material, (_, _, all)) in &mut open {
+        let corners = corner_of.remove(material).unwrap_or_default();
+        *all = corners.into_iter().map(|corner| pieces.root(corner)).collect::<BTreeSet<_>>().len();
     }
+    open
 }
 
 fn edges_of([a, b, c]: [u32; 3]) -> impl Iterator<Item = [u32; 2]> {

@@ -4,6 +4,7 @@
 use super::buffers::Geometry;
 use super::map::Map;
 use super::notes::Notes;
+use halflight_core::scene::Wrap;
 use std::collections::HashMap;
 
 /// Least coordinate that is reduced: f32 resolves 1/65536 below, a sixteenth of a texel of 4096.
@@ -48,7 +49,7 @@ impl Texcoords {
                 (map.options.scale, map.options.offset) = ([1.0; 2], [0.0; 2]);
             }
         }
-        if maps.iter().all(|map| !map.options.clamp) {
+        if maps.iter().all(|map| map.options.wrap == Wrap::REPEAT) {
             let scales: Vec<f64> = maps.iter().flat_map(|map| map.options.scale).collect();
             texcoords.period = period(&scales);
         }
@@ -165,7 +166,7 @@ mod tests {
         let far = [1e6, 1e6 + 1.0, 1e6, 1e6];
         assert_eq!(strip(far, Texcoords::default()).0.texcoords[1][0], 1_000_001.0);
         let mut clamped = Map::default();
-        clamped.options.clamp = true;
+        clamped.options.wrap = Wrap::CLAMP;
         assert_eq!(strip(far, Texcoords::of_maps(&mut [&mut clamped])).0.texcoords[1][0], 1_000_001.0);
     }
 

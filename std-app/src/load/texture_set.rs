@@ -222,7 +222,7 @@ impl TextureSet {
 
     /// The kind of relief in the picture of a map; `None` if it was not decoded.
     pub(super) fn relief(&self, map: &Map) -> Option<Relief> {
-        Some(relief::classify(&texture::view(self.picture(map)?, Content::Data, Wrap::Repeat)))
+        Some(relief::classify(&texture::view(self.picture(map)?, Content::Data, Wrap::REPEAT)))
     }
 
     /// True if the picture of a map was decoded and has an alpha channel.
@@ -266,10 +266,9 @@ impl TextureSet {
 
     /// The view of a picture by the options of a map.
     fn view_of(&mut self, picture: usize, map: &Map, content: Content) -> TextureId {
-        let MapOptions { scale, offset, clamp, .. } = map.options;
+        let MapOptions { scale, offset, wrap, .. } = map.options;
         let [scale, offset] = [scale, offset].map(|uv| uv.map(|x| x as f32).into());
         let transform = TextureTransform { scale, offset };
-        let wrap = if clamp { Wrap::Clamp } else { Wrap::Repeat };
         let view = View { picture, content, wrap, transform };
         let id = self.views.iter().position(|known| *known == view).unwrap_or_else(|| {
             self.views.push(view);

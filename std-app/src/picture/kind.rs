@@ -46,6 +46,10 @@ impl Kind {
             [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Self::WebP,
             [b'I', b'I', b'*' | b'+', 0, ..] | [b'M', b'M', 0, b'*' | b'+', ..] => Self::Tiff,
             [b'B', b'M', ..] => Self::Bmp,
+            [0xab, b'K', b'T', b'X', ..] => fail!(
+                "KTX is not read: `ktx extract` makes a PNG of it, and `npx @gltf-transform/cli ktxdecompress` \
+                 those of a glTF file"
+            ),
             _ if by_name || bytes.ends_with(b"TRUEVISION-XFILE.\0") => Self::Tga,
             _ => fail!("it is in no format that is known ({NAMES})"),
         })

@@ -6,6 +6,7 @@
 //! headers of all parts, because some readers look into the first alone.
 
 use super::Image;
+use halflight_core::film::PixelWindow;
 
 /// Value of an attribute.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,17 +32,24 @@ pub struct ExrFile<'i> {
     /// Channels beside the picture.
     pub(super) layers: Vec<(String, Value<'i>)>,
     pub(super) attributes: Vec<(String, Attribute)>,
+    /// The window of a larger picture that this one is.
+    pub(super) window: Option<PixelWindow>,
 }
 
 impl<'i> ExrFile<'i> {
     /// A file of one picture.
     pub fn of(image: &'i Image) -> Self {
-        Self { image, alpha: None, layers: Vec::new(), attributes: Vec::new() }
+        Self { image, alpha: None, layers: Vec::new(), attributes: Vec::new(), window: None }
     }
 
     /// Gives the picture a channel A, with its value at the pixel of an index, row by row from the top.
     pub fn set_alpha(&mut self, value: impl Fn(usize) -> f32 + Sync + 'i) {
         self.alpha = Some(Box::new(value));
+    }
+
+    /// Makes the picture a window of a larger one, which is the display window of the file.
+    pub fn set_window(&mut self, window: PixelWindow) {
+        self.window = Some(window);
     }
 
     /// Adds an attribute, or replaces the one of this name.

@@ -26,11 +26,15 @@ impl ExrFile<'_> {
     /// The bytes of the file.
     ///
     /// # Errors
-    /// A picture without pixels or with more than [`MAX_PIXELS`].
+    /// A picture without pixels or with more than [`MAX_PIXELS`], or of another size than its window.
     pub fn encode(self) -> Result<Vec<u8>, FileError> {
         let Image { width, height, pixels } = self.image;
         if pixels.is_empty() || pixels.len() > MAX_PIXELS {
             fail!("{width}x{height} pixels cannot be written");
+        }
+        let size = self.window.map(|window| window.size());
+        if let Some(size) = size.filter(|size| *size != [*width, *height]) {
+            fail!("{width}x{height} pixels are no window of {}x{} pixels", size[0], size[1]);
         }
         encode(self)
     }
@@ -38,7 +42,7 @@ impl ExrFile<'_> {
 
 /// The bytes of a file of at least one pixel.
 fn encode(file: ExrFile) -> Result<Vec<u8>, FileError> {
-    let ExrFile { image, alpha, mut layers, attributes } = file;
+    let ExrFile { image, alpha, mut layers, attributes, window } = file;
     let Image { width, height, pixels } = image;
     let size = Vec2(*width as usize, *height as usize);
     let channel = |channel: usize| -> Value { Box::new(move |pixel| pixels[pixel][channel]) };
@@ -46,8 +50,12 @@ fn encode(file: ExrFile) -> Result<Vec<u8>, FileError> {
     let alpha = alpha.into_iter().map(|alpha| ("A".to_owned(), alpha));
     let picture = Channels { list: alpha.chain(colours).collect(), width: size.x() };
     layers.sort_by(|(a, _), (b, _)| a.as_bytes().cmp(b.as_bytes()));
-    let mut of_image = ImageAttributes::new(IntegerBounds::from_dimensions(size));
-    let mut of_part = LayerAttributes::default();
+    let [across, down] = window.map_or([*width, *height], |window| window.frame());
+    let [left, top] = window.map_or([0; 2], |window| window.corner());
+    let frame = IntegerBounds::from_dimensions(Vec2(across as usize, down as usize));
+    let mut of_image = ImageAttributes::new(frame);
+    let position = Vec2(left as i32, top as i32);
+    let mut of_part = LayerAttributes { layer_position: position, ..LayerAttributes::default() };
     for (name, value) in attributes {
         // These have fields of their own, and no other place.
         match (name.as_str(), value) {

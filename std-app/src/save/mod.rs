@@ -1,5 +1,6 @@
 //! Pictures in files: PNG for display, EXR, HDR and PFM for values. [`crate::picture`] reads all formats.
 
+mod agx;
 mod destination;
 mod exr;
 #[cfg_attr(not(feature = "formats"), path = "no_exr_codec.rs")]

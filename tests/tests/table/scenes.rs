@@ -119,7 +119,7 @@ pub(crate) static SKY: [Texture<'static>; 1] = [Texture {
     width: 8,
     height: 4,
     texels: Texels::Float(&SKY_TEXELS),
-    wrap: Wrap::Repeat,
+    wrap: Wrap::REPEAT,
     transform: TextureTransform::IDENTITY,
 }];
 
@@ -136,7 +136,7 @@ static CHECKER: [Texture<'static>; 1] = [Texture {
     width: 2,
     height: 2,
     texels: Texels::Float(&CHECKER_TEXELS),
-    wrap: Wrap::Repeat,
+    wrap: Wrap::REPEAT,
     transform: TextureTransform::IDENTITY,
 }];
 

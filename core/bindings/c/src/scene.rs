@@ -249,7 +249,7 @@ impl HalflightTexture {
             _ => unsafe { array(self.linear.cast(), texels) }.map(Texels::Float),
         };
         let texels = texels.map_err(|_| HalflightStatus::Texture)?;
-        let wrap = if self.clamps { Wrap::Clamp } else { Wrap::Repeat };
+        let wrap = if self.clamps { Wrap::CLAMP } else { Wrap::REPEAT };
         Ok(Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY })
     }
 }

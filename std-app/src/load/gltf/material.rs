@@ -11,6 +11,7 @@ use crate::load::error::LoadError;
 use crate::load::files::Found;
 use crate::load::map::{Channel, Map, MapOptions};
 use crate::load::mtl::{MapKind, MtlMaterial};
+use halflight_core::scene::{TextureEdge, Wrap};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -265,10 +266,11 @@ impl Reader<'_, '_> {
         let mut options = MapOptions { channel: channel.map(Channel::Component), ..MapOptions::default() };
         let sampler = texture.sampler.and_then(|sampler| document.samplers.get(sampler));
         let (s, t) = sampler.map_or((None, None), |sampler| (sampler.wrap_s, sampler.wrap_t));
-        options.clamp = (s, t) == (Some(CLAMP), Some(CLAMP));
-        if !options.clamp && [s, t].iter().flatten().any(|wrap| *wrap != REPEAT) {
-            self.note("a texture is clamped or mirrored along one of its sides: it is repeated");
-        }
+        options.wrap = Wrap([s, t].map(|side| match side {
+            Some(CLAMP) => TextureEdge::Clamp,
+            Some(MIRROR) => TextureEdge::Mirror,
+            _ => TextureEdge::Repeat,
+        }));
         if kind == MapKind::Normal {
             options.bump_multiplier = info.scale;
         }
@@ -320,9 +322,9 @@ impl Reader<'_, '_> {
     }
 }
 
-/// Values of `wrapS` and `wrapT`.
-const REPEAT: u32 = 10497;
+/// Values of `wrapS` and `wrapT` other than the default, which repeats.
 const CLAMP: u32 = 33071;
+const MIRROR: u32 = 33648;
 
 /// Transmittance of a volume along its thickness.
 fn attenuation(volume: &json::Volume) -> [f64; 3] {

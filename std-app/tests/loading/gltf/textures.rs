@@ -3,7 +3,7 @@
 use super::{Gltf, load_files, pixel, png, says};
 use glam::Vec2;
 use halflight::load::LoadedScene;
-use halflight_core::scene::{NormalMap, ScalarInput, Surface, TextureId};
+use halflight_core::scene::{NormalMap, ScalarInput, Surface, TextureId, Wrap};
 use serde_json::{Value, json};
 
 /// A square whose texture 0 is this PNG.
@@ -100,6 +100,25 @@ fn rows_of_a_picture_go_down_and_transforms_apply() {
     assert_eq!(with(json!({ "rotation": core::f64::consts::FRAC_PI_2 })), [0.0, 1.0, 0.0]);
     assert_eq!(with(json!({ "texCoord": 1, "scale": [2, 4] })), [1.0; 3]);
     assert_eq!(first_corner(json!({ "index": 0, "texCoord": 1 })), [0.5, 0.5, 0.0]);
+}
+
+#[test]
+fn sides_of_a_texture_wrap_as_its_sampler_says() {
+    use halflight_core::scene::TextureEdge::{Clamp, Mirror, Repeat};
+    let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+    let mut file = textured(&png(2, 2, &FOUR), material);
+    file.json["textures"][0]["sampler"] = json!(0);
+    for (sampler, expected) in [
+        (json!({}), [Repeat, Repeat]),
+        (json!({ "wrapS": 33648, "wrapT": 33071 }), [Mirror, Clamp]),
+        (json!({ "wrapS": 10497, "wrapT": 33648 }), [Repeat, Mirror]),
+        (json!({ "wrapS": 1 }), [Repeat, Repeat]),
+    ] {
+        file.json["samplers"] = json!([sampler]);
+        let scene = file.loaded();
+        assert_eq!(scene.textures.views()[0].wrap, Wrap(expected), "{sampler}");
+        assert!(scene.repairs.is_empty(), "{:?}", scene.repairs);
+    }
 }
 
 #[test]
