@@ -117,13 +117,13 @@ fn methods_agree_with_paths_for_each_kind_of_camera() {
             };
             (0..REPLICAS).map(picture).collect()
         };
-        let paths = pictures(Method::Path, 64);
+        let paths = pictures(Method::Path, 32);
         for method in [Method::Bidirectional, Method::LightTracing, Method::VertexMerging] {
             // Light tracing does not show the lamp itself: see the textbook comparison for its splats.
             if method == Method::LightTracing && camera.lens_radius > 0.0 {
                 continue;
             }
-            let others = pictures(method, 64);
+            let others = pictures(method, 32);
             if let Err(why) = agree(&others, &paths, WIDEST) {
                 panic!("{method:?}, {:?}: {why}", camera.kind);
             }

@@ -205,7 +205,7 @@ fn rays_find_what_the_surroundings_of_instances_are_sure_of() {
         let [mut memory, mut other] = [&mesh, &copies.mesh()].map(|m| lines(Bvh::footprint_of(m).bytes()));
         let bvh = Bvh::build(&mesh, &mut Arena::over(&mut memory)).unwrap();
         let of_copies = Bvh::build(&copies.mesh(), &mut Arena::over(&mut other)).unwrap();
-        for _ in 0..1000 {
+        for _ in 0..400 {
             let [a, b, c] = mesh.corners(random.below(mesh.triangle_count() as usize) as u32);
             let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
             let reach = (0.02 + 0.3 * random.unit_f32()) * (b - a).length();
@@ -237,7 +237,7 @@ fn rays_find_what_the_surroundings_of_instances_are_sure_of() {
             }
         }
     }
-    assert!(sure > 2000 && 10 * sure >= 9 * sure_of_copies, "{sure} {sure_of_copies}");
+    assert!(sure > 800 && 10 * sure >= 9 * sure_of_copies, "{sure} {sure_of_copies}");
 }
 
 #[test]

@@ -161,7 +161,7 @@ mod tests {
         // From behind the plate hides all: its area alone is a little larger.
         let square =
             |half: f32, z: f32| [[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]];
-        let positions: Vec<[f32; 3]> = [square(1.0, 0.0), square(0.8, 0.3)].into_iter().flatten().collect();
+        let positions: Vec<[f32; 3]> = [square(1.0, 0.0), square(0.8, 0.1)].into_iter().flatten().collect();
         let faces = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
         let triangles = faces.map(|vertices| Triangle { vertices, material: 0 });
         let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
