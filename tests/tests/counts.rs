@@ -6,7 +6,7 @@ use halflight_core::findings::Decision;
 use halflight_core::scene::Scene;
 use halflight_tests::render::render;
 
-const SIZE: u32 = 96;
+const SIZE: u32 = 64;
 const SPP: u32 = 16;
 
 /// Relative variance of a picture by two of them, times the work in rays: a shadow ray is half a ray.

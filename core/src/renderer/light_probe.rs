@@ -117,8 +117,8 @@ mod tests {
         }
     }
 
-    /// Root mean square errors of irradiance below a distant lamp in `direction`, of irradiance 1: by the exact
-    /// projection of its radiance, and by its irradiances at the normals of the design.
+    /// Root mean square errors of irradiance below a distant lamp in `direction`, of irradiance 1: by the
+    /// exact projection of its radiance, and by its irradiances at the normals of the design.
     fn errors(direction: Vec3) -> [f64; 2] {
         let irradiance = |normal: Vec3| normal.dot(direction).max(0.0);
         let mut by_design = [0.0; 9];

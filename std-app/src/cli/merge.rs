@@ -27,8 +27,8 @@ pub(super) struct Merge {
     /// Films, one of each shard
     #[arg(required = true)]
     films: Vec<PathBuf>,
-    /// Picture: .png, .exr, .hdr or .pfm; of a bake its table (.csv, .res or .ply), lightmap (.exr, .hdr or .pfm)
-    /// or probes (.json, .csv or .ktx2); may be repeated
+    /// Picture: .png, .exr, .hdr or .pfm; of a bake its table (.csv, .res or .ply), lightmap (.exr, .hdr or
+    /// .pfm) or probes (.json, .csv or .ktx2); may be repeated
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     #[command(flatten)]

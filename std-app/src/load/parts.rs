@@ -130,7 +130,8 @@ impl SceneParts {
     /// coordinates (0, 1) are the first pixel of the first row.
     ///
     /// # Errors
-    /// A [`LoadError`] with `name`: a picture without pixels or with more than 32768 a side; insufficient memory.
+    /// A [`LoadError`] with `name`: a picture without pixels or with more than 32768 a side; insufficient
+    /// memory.
     pub fn texture(
         &mut self,
         name: &str,

@@ -48,8 +48,8 @@ struct View {
 }
 
 impl TextureSet {
-    /// Adds the pictures of `files`, each once, in parallel as far as `budget` allows. Pixels stay taken from the
-    /// budget.
+    /// Adds the pictures of `files`, each once, in parallel as far as `budget` allows. Pixels stay taken from
+    /// the budget.
     ///
     /// # Errors
     /// A `required` picture that is unreadable or too large; others are left out with a note.

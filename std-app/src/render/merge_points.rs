@@ -12,8 +12,8 @@ use halflight_core::method::Shard;
 use halflight_core::renderer::PointFilm;
 use std::path::{Path, PathBuf};
 
-/// Merges the bakes in `files`, in any order. Returns the points in the order of the values, and the bytes that
-/// the caller attached, as well.
+/// Merges the bakes in `files`, in any order. Returns the points in the order of the values, and the bytes
+/// that the caller attached, as well.
 ///
 /// # Errors
 /// Names the first file that does not belong to the first one and why, or missing and repeated shards.

@@ -104,6 +104,14 @@ pub struct BakeProgress {
     pub seconds_left: Option<f64>,
 }
 
+impl BakeProgress {
+    fn after(start: Instant, settings: &BakeSettings, samples: u32, tiles: [usize; 2]) -> Self {
+        let seconds = start.elapsed().as_secs_f64();
+        let seconds_left = settings.stop.seconds.map(|limit| (limit - seconds).max(0.0));
+        Self { samples, tiles, seconds, seconds_left }
+    }
+}
+
 /// Irradiance of all points.
 #[derive(Clone, Debug)]
 pub struct Baked {
@@ -246,9 +254,7 @@ pub(crate) fn with_points(
     let end = End::Round(workers.deadline.after(0.5));
     for (points, shares) in points.chunks(BACK_FACES_AT_ONCE).zip(shares.chunks_mut(BACK_FACES_AT_ONCE)) {
         back_faces(&context, points, shares, &mut Threads::new(&workers, &mut scratch).until(end))?;
-        let seconds = start.elapsed().as_secs_f64();
-        let seconds_left = settings.stop.seconds.map(|limit| (limit - seconds).max(0.0));
-        progress(&BakeProgress { samples: 0, tiles: [0; 2], seconds, seconds_left });
+        progress(&BakeProgress::after(start, settings, 0, [0; 2]));
     }
     let mut executor = Threads::new(&workers, &mut scratch).until(End::FirstRound(None));
     let lights = built.lights.with_level(settings.level);
@@ -273,10 +279,8 @@ pub(crate) fn with_points(
             None => renderer.step(&mut executor, Until::Samples(target))?,
         }
         is_first = false;
-        let seconds = start.elapsed().as_secs_f64();
         let tiles = renderer.tiles();
-        let seconds_left = settings.stop.seconds.map(|limit| (limit - seconds).max(0.0));
-        progress(&BakeProgress { samples: renderer.samples(), tiles, seconds, seconds_left });
+        progress(&BakeProgress::after(start, settings, renderer.samples(), tiles));
         kept.update(&renderer);
         let is_exact = settings.stop.error.is_some() && tiles[0] == tiles[1];
         // Tiles within the error have fewer.

@@ -119,8 +119,8 @@ impl IrradiancePoint {
         if point.triangle == MISS { point } else { point.off_walls(context) }
     }
 
-    /// A point of a triangle whose border is the foot of a wall, in front of it: rays of the very border begin
-    /// in the plane of the wall and pass it by.
+    /// A point of a triangle whose border is the foot of a wall, in front of it: rays of the very border
+    /// begin in the plane of the wall and pass it by.
     fn off_walls<F: Features>(self, context: &SceneContext<F>) -> Self {
         let corners = context.scene.mesh.corners(self.triangle);
         let (position, middle) = (Vec3::from(self.position), corners.iter().sum::<Vec3>() / 3.0);
