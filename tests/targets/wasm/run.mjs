@@ -2,7 +2,7 @@
 import { readFileSync } from "node:fs";
 
 const { instance } = await WebAssembly.instantiate(readFileSync(process.argv[2]), {});
-for (let method = 0; method < instance.exports.methods(); method++) {
-  const fingerprint = BigInt.asUintN(64, instance.exports.render(method));
+for (let program = 0; program < instance.exports.programs(); program++) {
+  const fingerprint = BigInt.asUintN(64, instance.exports.run(program));
   console.log(fingerprint.toString(16).padStart(16, "0"));
 }

@@ -1,5 +1,5 @@
-//! The tiny render (`core/examples/tiny_render.rs`) on every constrained target: it must build, and where it
-//! can run its bits must equal those of the ordinary example.
+//! The small programs (`tiny_render.rs` and `tiny_parts.rs` of `core/examples`) on every constrained target: they
+//! must build, and where they can run their bits must equal those of the ordinary examples.
 
 use crate::command::{command, exists, fresh_cargo, in_pairs, output, run};
 use crate::{Failure, Outcome, Project};
@@ -66,14 +66,17 @@ const BUILDS: &[Build] = &[
 
 pub(crate) fn check(project: &Project) -> Outcome {
     // The whole workspace: with the features of the tests, whose products it shares.
-    let example = "cargo build --profile quick --quiet --locked --workspace --example tiny_render";
-    run(&mut command(&project.root, example))?;
-    let products = std::env::current_exe().unwrap_or_default();
-    let picture = output(&mut Command::new(products.with_file_name("examples").join("tiny_render")))?;
-    println!("{picture}");
-    // Each picture is followed by a fingerprint per method.
+    let examples =
+        "cargo build --profile quick --quiet --locked --workspace --example tiny_render --example tiny_parts";
+    run(&mut command(&project.root, examples))?;
+    let examples = std::env::current_exe().unwrap_or_default().with_file_name("examples");
+    let [pictures, parts] =
+        ["tiny_render", "tiny_parts"].map(|name| output(&mut Command::new(examples.join(name))));
+    let [pictures, parts] = [pictures?, parts?];
+    println!("{pictures}\n{parts}");
+    // A fingerprint follows each picture and each part.
     let is_fingerprint = |line: &&str| line.len() == 16 && line.bytes().all(|byte| byte.is_ascii_hexdigit());
-    let expected: Vec<&str> = picture.lines().filter(is_fingerprint).collect();
+    let expected = [&pictures, &parts].map(|text| text.lines().filter(is_fingerprint).collect::<Vec<_>>());
 
     // All builds are tried, so that a missing tool hides no failure.
     let results: Vec<_> =
@@ -89,7 +92,13 @@ pub(crate) fn check(project: &Project) -> Outcome {
     errors.sort_by_key(|(_, result)| !failed(result));
     match errors.into_iter().next() {
         Some((_, error)) => error,
-        None => Ok(format!("{} builds and the example agree on {} pictures", BUILDS.len(), expected.len())),
+        None => {
+            let [pictures, parts] = expected.map(|lines| lines.len());
+            Ok(format!(
+                "{} builds and the examples agree on {pictures} pictures and {parts} parts",
+                BUILDS.len()
+            ))
+        }
     }
 }
 
@@ -97,7 +106,7 @@ pub(crate) fn check(project: &Project) -> Outcome {
 const ZEROS: &str = "0000000000000000";
 
 /// Builds, runs and compares one build.
-fn one(project: &Project, build: &Build, expected: &[&str]) -> Outcome {
+fn one(project: &Project, build: &Build, [pictures, parts]: &[Vec<&str>; 2]) -> Outcome {
     let folder = project.root.join("tests/targets");
     let target = folder.join("target").join(format!("{}{}", build.package, build.features.replace('+', "-")));
     let mut cargo = match build.run {
@@ -138,15 +147,17 @@ fn one(project: &Project, build: &Build, expected: &[&str]) -> Outcome {
     if let Some(simd) = build.simd {
         instructions_as_promised(&file, simd)?;
     }
-    // Methods that do not fit into the board's memory give zeros there.
+    // Methods that do not fit into the board's memory give zeros there; each part fits.
     let is_short = |line: &str| matches!(build.run, Run::Board) && line == ZEROS;
     let lines: Vec<&str> = seen.lines().collect();
-    let is_same = lines.len() == expected.len()
-        && lines.iter().zip(expected).all(|(line, expected)| line == expected || is_short(line));
-    let fitting = lines.iter().filter(|line| !is_short(line)).count();
+    let (of_pictures, of_parts) = lines.split_at(lines.len().min(pictures.len()));
+    let is_same = of_parts == parts.as_slice()
+        && of_pictures.iter().zip(pictures).all(|(line, expected)| line == expected || is_short(line));
+    let fitting = of_pictures.iter().filter(|line| !is_short(line)).count();
+    let size = size(&file);
     match is_same && fitting > 0 {
-        true => Ok(format!("{fitting} of {} methods ({})", lines.len(), size(&file))),
-        false => Err(Failure::Failed(format!("{}: {lines:?}, the example gives {expected:?}", build.name))),
+        true => Ok(format!("{fitting} of {} methods, {} parts ({size})", pictures.len(), parts.len())),
+        false => Err(Failure::Failed(format!("{}: {lines:?}, not {pictures:?} {parts:?}", build.name))),
     }
 }
 

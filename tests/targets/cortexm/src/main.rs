@@ -31,9 +31,9 @@ extern "C" fn run() -> ! {
     let memory = &raw mut MEMORY;
     // SAFETY: called once, by `reset`, on the only core.
     let memory = unsafe { &mut *memory };
-    for method in 0..tiny::METHODS {
+    for program in 0..tiny::PROGRAMS {
         let mut text = [0; 18];
-        text[..17].copy_from_slice(&tiny::digits(memory.render(method)));
+        text[..17].copy_from_slice(&tiny::digits(memory.run(program)));
         const WRITE_TEXT: usize = 4;
         semihost(WRITE_TEXT, text.as_ptr() as usize);
     }

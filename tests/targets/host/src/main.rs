@@ -14,8 +14,8 @@ extern "C" fn run() -> ! {
     let memory = &raw mut MEMORY;
     // SAFETY: called once, by `_start`, on the only thread.
     let memory = unsafe { &mut *memory };
-    for method in 0..tiny::METHODS {
-        write(&tiny::digits(memory.render(method)));
+    for program in 0..tiny::PROGRAMS {
+        write(&tiny::digits(memory.run(program)));
     }
     exit(0)
 }

@@ -1,5 +1,5 @@
-//! `core/examples/tiny_render.rs` as a library: the very file that newcomers copy, with its printing
-//! switched off, for programs that have nothing to print with.
+//! `core/examples/tiny_render.rs` and `tiny_parts.rs` as a library: the very files that newcomers copy, with
+//! their printing switched off, for programs that have nothing to print with.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -20,14 +20,17 @@ macro_rules! vec {
 #[allow(dead_code, unused_variables, unused_macros)]
 #[path = "../../../../core/examples/tiny_render.rs"]
 mod example;
+#[allow(dead_code, unused_variables, unused_macros)]
+#[path = "../../../../core/examples/tiny_parts.rs"]
+mod parts;
 
 use example::room::fingerprint;
-use example::{METHODS as ALL, SIZE, render};
+use example::{METHODS, SIZE, render};
 use halflight_core::Rgb;
 use halflight_core::memory::Line;
 
-/// Number of methods.
-pub const METHODS: usize = ALL.len();
+/// Number of programs: a picture by each method, then the parts.
+pub const PROGRAMS: usize = METHODS.len() + parts::PARTS.len();
 
 /// Cache lines that are enough for every method.
 pub const LINES: usize = example::LINES;
@@ -44,12 +47,18 @@ impl<const LINES: usize> Memory<LINES> {
         Self { lines: [Line([0; 64]); LINES], pixels: [Rgb::ZERO; SIZE * SIZE] }
     }
 
-    /// The fingerprint of the picture by method number `method`, or 0 where the memory is too small.
-    pub fn render(&mut self, method: usize) -> u64 {
-        match render(ALL[method], &mut self.lines, &mut self.pixels) {
-            Ok(()) => fingerprint(&self.pixels),
-            Err(_) => 0,
-        }
+    /// The fingerprint of the picture or the values of a program, or 0 where the memory is too small.
+    pub fn run(&mut self, program: usize) -> u64 {
+        let Self { lines, pixels } = self;
+        let (is_done, values) = match METHODS.get(program) {
+            Some(method) => (render(*method, lines, pixels).is_ok(), &pixels[..]),
+            None => {
+                let (_, part) = parts::PARTS[program - METHODS.len()];
+                let values = &mut pixels[..parts::COUNT];
+                (part(&mut lines[..LINES.min(parts::LINES)], values).is_ok(), &*values)
+            }
+        };
+        if is_done { fingerprint(values) } else { 0 }
     }
 }
 

@@ -3,19 +3,19 @@
 
 static mut MEMORY: tiny::Memory<{ tiny::LINES }> = tiny::Memory::new();
 
-/// Number of methods.
+/// Number of programs.
 #[unsafe(no_mangle)]
-pub extern "C" fn methods() -> u32 {
-    tiny::METHODS as u32
+pub extern "C" fn programs() -> u32 {
+    tiny::PROGRAMS as u32
 }
 
-/// The fingerprint of the picture by method number `method`.
+/// The fingerprint of a program.
 #[unsafe(no_mangle)]
-pub extern "C" fn render(method: u32) -> u64 {
+pub extern "C" fn run(program: u32) -> u64 {
     let memory = &raw mut MEMORY;
     // SAFETY: the module has one thread, and no other function takes it.
     let memory = unsafe { &mut *memory };
-    memory.render(method as usize)
+    memory.run(program as usize)
 }
 
 #[panic_handler]
