@@ -35,7 +35,7 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
         let found = floor(&result);
         if method == Method::Metropolis {
             // Only splats find this light, and few points of primary sample space are splats.
-            let replicas: Vec<_> = (0..12).map(|seed| vec![floor(&render(method, None, seed))]).collect();
+            let replicas: Vec<_> = (0..24).map(|seed| vec![floor(&render(method, None, seed))]).collect();
             judge(&replicas, &[known]).unwrap();
         } else {
             assert!((found / known - 1.0).abs() < 0.03, "{}: {found}, not {known}", method.name());

@@ -4,8 +4,8 @@
 
 use core::arch::{asm, naked_asm};
 
-/// 512 KiB: what does not fit says so by zeros.
-static mut MEMORY: tiny::Memory<8192> = tiny::Memory::new();
+/// 3 MiB of the 4 that the board has: what does not fit says so by zeros.
+static mut MEMORY: tiny::Memory<49152> = tiny::Memory::new();
 
 /// What follows the stack's top in the vector table: reset, and every fault.
 #[used]
