@@ -1,5 +1,5 @@
-//! The small programs (`tiny_render.rs` and `tiny_parts.rs` of `core/examples`) on every constrained target: they
-//! must build, and where they can run their bits must equal those of the ordinary examples.
+//! The small programs (`tiny_render.rs` and `tiny_parts.rs` of `core/examples`) on every constrained target:
+//! they must build, and where they can run their bits must equal those of the ordinary examples.
 
 use crate::command::{command, exists, fresh_cargo, in_pairs, output, run};
 use crate::{Failure, Outcome, Project};
