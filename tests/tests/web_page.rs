@@ -212,7 +212,7 @@ fn assert_probes(numbers: &dyn Fn(&str) -> Vec<f32>, own: &[Probe]) {
         difference <= probe.half_widths[*i].hypot(own.half_widths[*i])
     });
     let agree = agree.count();
-    // Of 243 intervals 95 % hold: five standard deviations fewer are 214.
+    // Intervals of 95 %: five standard deviations fewer than 231 of 243 are 214.
     assert!(agree >= 214, "{agree} of 243 coefficients agree");
     assert!(probes.iter().all(|probe| probe.half_widths[0] < 0.1 * luminance(probe.coefficients[0])));
 

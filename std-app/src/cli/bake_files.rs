@@ -38,7 +38,7 @@ impl TableFiles {
     }
 
     pub(super) fn plan(&self, outputs: &mut Outputs) -> Result<(), Failure> {
-        self.0.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))
+        plan_tables(&self.0, outputs)
     }
 
     pub(super) fn save(
@@ -51,6 +51,10 @@ impl TableFiles {
             outputs.save_table(path, |out| write_table(out, (*format, quantity), sensors, columns));
         }
     }
+}
+
+fn plan_tables<T>(files: &[(PathBuf, T)], outputs: &mut Outputs) -> Result<(), Failure> {
+    files.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))
 }
 
 fn formats<T>(
@@ -79,7 +83,7 @@ impl MapFiles {
     }
 
     pub(super) fn plan(&self, outputs: &mut Outputs) -> Result<(), Failure> {
-        self.maps.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))?;
+        plan_tables(&self.maps, outputs)?;
         self.error_map.iter().try_for_each(|(path, _)| outputs.plan(Role::ErrorMap, path))
     }
 
@@ -123,7 +127,7 @@ impl ProbeFiles {
     }
 
     pub(super) fn plan(&self, outputs: &mut Outputs) -> Result<(), Failure> {
-        self.0.iter().try_for_each(|(path, _)| outputs.plan(Role::Table, path))
+        plan_tables(&self.0, outputs)
     }
 
     /// True if a file has ambient cubes.

@@ -185,6 +185,22 @@ impl SceneBuilder {
         }
     }
 
+    /// Places a file by its extension; `material` replaces all of its materials, and `share` decides whether
+    /// its placements share memory.
+    fn add_file(
+        &mut self,
+        path: &Path,
+        placement: Placement,
+        material: Option<&str>,
+        share: Option<bool>,
+    ) -> Result<(), LoadError> {
+        let extension = path.extension().unwrap_or_default();
+        match ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {
+            true => self.add_model(path, placement, material, share),
+            false => self.add_mesh(path, placement, material, share),
+        }
+    }
+
     /// Places an OBJ file; `material` replaces all of its materials.
     fn add_mesh(
         &mut self,

@@ -21,19 +21,14 @@ pub(super) struct ReadModel {
 }
 
 impl SceneBuilder {
-    /// Places a file by its extension; `material` replaces all of its materials, and `share` decides whether
-    /// its placements share memory.
-    pub(super) fn add_file(
+    /// Places a glTF file; `material` replaces all of its materials.
+    pub(super) fn add_model(
         &mut self,
         path: &Path,
         placement: Placement,
         material: Option<&str>,
         share: Option<bool>,
     ) -> Result<(), LoadError> {
-        let extension = path.extension().unwrap_or_default();
-        if !["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {
-            return self.add_mesh(path, placement, material, share);
-        }
         let model = match self.models.get(path) {
             Some(model) => model.clone(),
             None => {
