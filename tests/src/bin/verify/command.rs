@@ -2,8 +2,10 @@
 
 use crate::{Failure, Outcome};
 use std::io::{BufRead, BufReader};
+use std::iter;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 /// `program arguments…` in `directory`, split at spaces.
@@ -70,16 +72,19 @@ pub(crate) fn output(command: &mut Command) -> Outcome {
     }
 }
 
-/// Results of `check` for all `items`, two at a time: each keeps one processor busy.
+/// Results of `check` for all `items`, in their order: two threads take one item after the other.
 pub(crate) fn in_pairs<T: Sync, R: Send>(items: &[T], check: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let pairs = items.chunks(2).flat_map(|pair| {
-        thread::scope(|scope| {
-            let jobs: Vec<_> = pair.iter().map(|item| scope.spawn(|| check(item))).collect();
-            let done = jobs.into_iter().map(|job| job.join().expect("a check does not panic"));
-            done.collect::<Vec<_>>()
-        })
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let numbers = iter::repeat_with(|| next.fetch_add(1, Ordering::Relaxed));
+        numbers.map_while(|number| Some((number, check(items.get(number)?)))).collect::<Vec<_>>()
+    };
+    let mut results = thread::scope(|scope| {
+        let threads = [scope.spawn(work), scope.spawn(work)];
+        threads.into_iter().flat_map(|thread| thread.join().expect("no check panics")).collect::<Vec<_>>()
     });
-    pairs.collect()
+    results.sort_by_key(|(number, _)| *number);
+    results.into_iter().map(|(_, result)| result).collect()
 }
 
 /// Whether a program can be started.

@@ -1,5 +1,5 @@
-//! A short run of every fuzz target from its corpus: by cargo-fuzz if it and a nightly toolchain are
-//! installed, else by the driver `mutate`.
+//! A short run of every fuzz target from its corpus by the driver `mutate`; a campaign, which `--fuzz-seconds`
+//! asks for, is guided by coverage where cargo-fuzz and a nightly toolchain are installed.
 
 use crate::command::{command, fresh_cargo, in_pairs, output, run};
 use crate::{Failure, Outcome, Project};
@@ -22,7 +22,9 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
     }
     targets.sort();
 
-    let coverage = has_cargo_fuzz();
+    // libFuzzer needs sanitized builds of everything, which take longer than the short runs.
+    let is_campaign = seconds > SMOKE_SECONDS;
+    let coverage = is_campaign && has_cargo_fuzz();
     // One build for all targets, beside the products of the main workspace, whose dependencies it shares.
     let products = project.root.join("target");
     if !coverage {
@@ -33,7 +35,7 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
     let driver = products.join("quick/mutate");
     // Smoke runs end after a fixed number of runs, so that every machine has the same result; campaigns end
     // by the clock.
-    let runs = if seconds <= SMOKE_SECONDS { SMOKE_RUNS } else { -1 };
+    let runs = if is_campaign { -1 } else { SMOKE_RUNS };
     let results = in_pairs(&targets, |target| {
         if coverage {
             // libFuzzer writes new inputs to the first directory; the second is the corpus of the repository.
@@ -51,8 +53,9 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
         }
     });
     results.into_iter().collect::<Result<(), Failure>>()?;
-    let name = if coverage { "libFuzzer" } else { "the stable driver (no cargo-fuzz or no nightly here)" };
-    Ok(format!("{} targets, {seconds} s each, by {name}", targets.len()))
+    let name = if coverage { "libFuzzer" } else { "the stable driver" };
+    let length = if is_campaign { format!("{seconds} s") } else { format!("{SMOKE_RUNS} runs") };
+    Ok(format!("{} targets, {length} each, by {name}", targets.len()))
 }
 
 fn has_cargo_fuzz() -> bool {
