@@ -26,12 +26,12 @@ use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 /// Least radius of a record in pixels: pixels that placement looks at and that are neighbours share it.
 pub const LEAST_PIXELS: f32 = 2.0;
 
-/// The fraction of the time that is left before both caches are filled in which each is to be filled: both
+/// Fraction of the time for each of both caches, of the time that is left before the first is filled: both
 /// are cut alike. Points that no record reaches by then are path traced. A smaller fraction leaves more to
 /// paths where filling is slow (docs/decisions/cache-time.md#deadline).
 const TIME: f32 = 0.18;
 
-/// The same for the view-bound records of both halves, of the time that is left then.
+/// The same for each half of the view-bound records, of the time that is left when the caches are filled.
 const VIEW_TIME: f32 = 0.1;
 
 /// Structures that [`IrradianceCaching::fill`] fills: two caches, and view-bound records beside each.

@@ -30,7 +30,7 @@ pub const LEAST_SAMPLES: u32 = 2 * FEWEST;
 pub enum NotReconstructed {
     /// Neighbouring pixels have errors in common.
     Correlated,
-    /// A half of a pixel has fewer than two samples.
+    /// A half of a pixel has fewer than two samples, as outside of a shard or window.
     FewSamples,
     /// No half has met light.
     Black,
@@ -43,7 +43,7 @@ impl NotReconstructed {
     pub const fn reason(self) -> &'static str {
         match self {
             Self::Correlated => "pixels that share records or photons cannot judge each other",
-            Self::FewSamples => "a half of the film has fewer than two samples of a pixel",
+            Self::FewSamples => "a pixel has fewer than two samples in a half, as outside of a shard or window",
             Self::Black => "no sample has met light",
             Self::NoGain => "the error of the samples is not larger",
         }

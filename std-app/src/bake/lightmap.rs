@@ -286,7 +286,7 @@ fn chosen<'a>(
     let LoadedScene { meshes, material_names, object_names, triangle_objects, .. } = loaded;
     let names = || meshes.iter().map(|(name, _)| name).chain(object_names).chain(material_names);
     if let Some(subject) = subject.filter(|subject| !names().any(|name| name == subject)) {
-        let mut all: Vec<String> = names().cloned().collect();
+        let mut all: Vec<String> = names().filter(|name| !name.is_empty()).cloned().collect();
         all.sort_unstable();
         all.dedup();
         return Err(LightmapError::Subject(subject.to_owned(), all));

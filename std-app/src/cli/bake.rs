@@ -66,7 +66,7 @@ pub(super) struct Bake {
     #[arg(long, default_value = "path", conflicts_with_all = ["kept", "resume", "shard"])]
     method: Method,
 
-    /// Samples per point
+    /// Samples per point; fewer than 64 points have several independent estimates of so many samples
     #[arg(long, value_name = "N", value_parser = values::checked::<u32, Samples>)]
     spp: Option<Samples>,
     /// Time, as in 30s, 2m, 1h

@@ -157,6 +157,8 @@ pub(super) enum BakeFiles {
 }
 
 impl BakeFiles {
+    /// Files of a merge of `subject`.
+    ///
     /// # Errors
     /// Files of other formats than those of `subject`.
     pub(super) fn new(

@@ -51,7 +51,7 @@ impl CameraArgs {
         if let Some(degrees) = self.fov {
             if camera.kind != CameraKind::Perspective {
                 return Err(Failure::new("--fov is of perspective cameras, and this one is another")
-                    .advice("the scene file has the `height` of an orthographic camera"));
+                    .advice("leave out --fov: the scene file has the `height` of an orthographic camera"));
             }
             camera.tan_half_fov = (0.5 * degrees).to_radians().tan() as f32;
         }

@@ -35,7 +35,7 @@ pub(super) struct Race {
     scene: PathBuf,
     /// Methods of `render`, each with options after colons, as in path,path:max-depth=2; an option is a flag
     /// below without dashes, and wins over the flag of the race
-    #[arg(long, value_name = "METHOD[:OPTION=VALUE]...,...", value_parser = race_entry, value_delimiter = ',',
+    #[arg(long, value_name = "METHOD[:OPTION[=VALUE]]...,...", value_parser = race_entry, value_delimiter = ',',
         required = true, display_order = 1)]
     methods: Vec<RaceEntry>,
     /// Rendering time of each method, as in 30s, 2m, 1h

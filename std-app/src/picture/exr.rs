@@ -92,7 +92,7 @@ fn read_blocks(
     let is_wanted = |layer: usize, level: Vec2<usize>| layer == part && level == Vec2(0, 0);
     let chunks = reader
         .filter_chunks(false, |_, tile, block| is_wanted(block.layer, tile.level_index))
-        .map_err(FileError::new)?;
+        .map_err(refused)?;
     let insert = |meta: &exr::meta::MetaData, block: UncompressedBlock| {
         // The table and the blocks of a file may disagree.
         if is_wanted(block.index.layer, block.index.level) {
@@ -104,11 +104,11 @@ fn read_blocks(
         true => chunks.decompress_parallel(false, insert),
         false => chunks.decompress_sequential(false, insert),
     };
-    read.map_err(FileError::new)
+    read.map_err(refused)
 }
 
 fn open(bytes: &[u8]) -> Result<File<'_>, FileError> {
-    let reader = exr::block::read(Cursor::new(bytes), false).map_err(FileError::new)?;
+    let reader = exr::block::read(Cursor::new(bytes), false).map_err(refused)?;
     let headers = reader.headers();
     let names = |header: &Header| header.channels.list.iter().map(|c| c.name.to_string()).collect();
     let parts: Vec<Vec<String>> = headers.iter().map(names).collect();
@@ -140,6 +140,14 @@ fn matrix(header: &Header, notes: &mut Vec<String>) -> Option<DMat3> {
     let numbers: Vec<String> = given.as_flattened().iter().map(|x| format!("{:.4}", x)).collect();
     notes.push(format!("its colours of chromaticities {} {what}", numbers.join(" ")));
     matrix
+}
+
+/// An error of the decoder.
+fn refused(error: exr::error::Error) -> FileError {
+    match error {
+        exr::error::Error::Invalid(why) => FileError::new(format!("it is damaged or cut off: {why}")),
+        other => FileError::new(other),
+    }
 }
 
 fn check(header: &Header) -> Result<(), FileError> {

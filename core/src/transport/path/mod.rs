@@ -6,7 +6,7 @@
 //! 2. Shadow rays are traced after all vertices of the wave are shaded; their light is added to the path
 //!    then.
 //! 3. Code for features that the scene does not have is not compiled in ([`Features`]).
-//! 4. An [`LightEstimator`] supplies part of the light at a vertex: a cache, photon maps, or photons to merge
+//! 4. A [`LightEstimator`] supplies part of the light at a vertex: a cache, photon maps, or photons to merge
 //!    with. Without one the result equals the plain algorithm to the bit.
 //! 5. If it pays, pixels of a circle share the light that their paths find ([`PathReuse`]).
 //! 6. Pixels on the border of a lamp trace extra rays for its emission (`silhouette.rs`).

@@ -1,5 +1,6 @@
 //! Random walk of light subpaths, from the emission to the last surface. A [`Visitor`] acts at each vertex:
-//! `deposit.rs` stores photons of all light, `caustics.rs` those of caustics.
+//! `photon_mapping/deposit.rs` stores photons of all light, `caustics/tracer.rs` those of caustics,
+//! `bidirectional/light_pass.rs` vertices for connections.
 //!
 //! All paths of a task advance together, so that rays are traced in batches. Path `i` of map `n` depends on
 //! (seed, n, i) alone.

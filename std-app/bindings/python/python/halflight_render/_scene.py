@@ -50,7 +50,7 @@ class Camera:
     up: ArrayLike | None = None
     #: Vertical field of view in degrees.
     fov: float | None = None
-    #: Radius of the lens, and its distance in focus; None is a pinhole.
+    #: Radius of the lens, and its distance in focus; 0 is a pinhole.
     lens: float | tuple[float, float] | None = None
 
     def flags(self) -> dict[str, object]:
