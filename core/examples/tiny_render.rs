@@ -18,7 +18,7 @@ const COUNTS: BidirectionalSettings =
     BidirectionalSettings { light_paths: Some(1024), connections: Some(1), merging: Some(false) };
 const CACHE: CacheOptions = CacheOptions { strata: Some(8), records: Some(512), ..CacheOptions::DEFAULT };
 const LOBES: LobeSettings = LobeSettings { tolerance: 0.05, degree: 2, ..LobeSettings::DEFAULT };
-/// All methods.
+/// All methods but the clamped form of instant radiosity.
 pub const METHODS: [Method; 10] = [
     Method::Path(PathOptions::PLAIN),
     Method::LightTracing(COUNTS),

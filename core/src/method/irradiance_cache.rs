@@ -23,7 +23,7 @@ use crate::transport::cached::gather::GatherPoint;
 use crate::transport::cached::point_places::PointPlaces;
 use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 
-/// Least radius of a record in pixels: pixels that placement looks at and that are neighbours share it.
+/// Least radius of a record in pixels: the distance of neighbours among the pixels that placement visits.
 pub const LEAST_PIXELS: f32 = 2.0;
 
 /// Fraction of the time for each of both caches, of the time that is left before the first is filled: both

@@ -43,7 +43,9 @@ impl NotReconstructed {
     pub const fn reason(self) -> &'static str {
         match self {
             Self::Correlated => "pixels that share records or photons cannot judge each other",
-            Self::FewSamples => "a pixel has fewer than two samples in a half, as outside of a shard or window",
+            Self::FewSamples => {
+                "a pixel has fewer than two samples in a half, as outside of a shard or window"
+            }
             Self::Black => "no sample has met light",
             Self::NoGain => "the error of the samples is not larger",
         }

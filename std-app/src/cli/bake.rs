@@ -282,7 +282,8 @@ impl Bake {
         let [build, sampling] = baked.seconds.map(readable_seconds);
         let half_width =
             baked.median_half_width().map_or("unknown".into(), |half| format!("{:.2} %", 100.0 * half));
-        let fewest = baked.values.iter().map(|value| value.samples).min().unwrap_or_default();
+        let is_own = |samples: &u32| *samples > 0 || !self.parts.is_part();
+        let fewest = baked.values.iter().map(|value| value.samples).filter(is_own).min().unwrap_or_default();
         format!(
             "{} points, at least {fewest} samples each; median half-width of the intervals {half_width}; \
              built in {build}, sampled in {sampling}",

@@ -8,7 +8,6 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use halflight::load::{LoadOptions, LoadedScene};
 use halflight::memory::Budget;
-use halflight::quantity::readable_bytes;
 use halflight::render::{
     BidirectionalSettings, CacheSettings, LobeSettings, Method, MetropolisSettings, PhotonSettings,
     PrimarySpace, Reconstruct, RenderError, Settings, Stop, VirtualLightSettings,
@@ -149,7 +148,7 @@ impl ValueEnum for MethodArg {
 /// Settings that may differ between the methods of a race.
 #[derive(Args, Clone, Debug)]
 pub(super) struct MethodArgs {
-    /// Caustic photons with path and irradiance-cache [default: auto]
+    /// Caustic photons with path and both caches [default: auto]
     #[arg(long, help_heading = "Light transport")]
     caustics: Option<Caustics>,
     /// Path reuse among neighbouring pixels: less noise in indirect light, but correlated [default: auto]
@@ -387,10 +386,9 @@ pub(super) fn note_darkness(scene: &Scene) -> bool {
 pub(super) fn render_failure(scene: &Path, error: &RenderError) -> Failure {
     let failure = Failure::new(format!("{}: {error}", scene.display()));
     match error {
-        RenderError::Memory { needed, .. } => failure.advice(format!(
-            "{} are needed: raise --memory, or lower --size or --threads",
-            readable_bytes(*needed)
-        )),
+        RenderError::Memory { needed, .. } => {
+            failure.advice(format!("raise --memory to {needed}, or lower --size or --threads"))
+        }
         _ => failure,
     }
 }
