@@ -53,8 +53,8 @@ impl ViewArgs {
         ViewTransform { stops, curve: self.view }
     }
 
-    /// The picture as PNG files show it. Where one of `files` is a PNG that is nearly all black or burnt out, a
-    /// note names an exposure that would show it.
+    /// The picture as PNG files show it. Where one of `files` is a PNG that is nearly all black or burnt out,
+    /// a note names an exposure that would show it.
     pub(super) fn shown<'i>(&self, image: &'i Image, files: &[PathBuf]) -> Cow<'i, Image> {
         let view = self.transform(image);
         let is_png = |file: &PathBuf| Format::of(file).is_ok_and(|format| !format.is_linear());
