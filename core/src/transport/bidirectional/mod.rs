@@ -8,9 +8,9 @@
 //!    emission that it hits, merges with photons, a light sample, and connections to stored vertices; then it
 //!    scatters.
 //!
-//! The loop over samples is `RenderMethod::round` in `method/bidirectional`. Both walks carry the running sums
-//! of `walk/sums.rs`, which weight all techniques by [`Counts`]: without light paths the camera paths are path
-//! tracing, without connections both together are light tracing.
+//! The loop over samples is `RenderMethod::round` in `method/bidirectional`. Both walks carry the running
+//! sums of `walk/sums.rs`, which weight all techniques by [`Counts`]: without light paths the camera paths are
+//! path tracing, without connections both together are light tracing.
 //!
 //! A vertex is a *caster* if its surface reflects or transmits in a narrow lobe
 //! ([`Bsdf::is_caustic_caster`](crate::bsdf::Bsdf::is_caustic_caster)), and *rough* otherwise.

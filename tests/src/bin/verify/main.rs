@@ -1,6 +1,6 @@
 //! All checks of the project, for developers and CI: `cargo verify [STEP…] [--allow-missing] [--fuzz-seconds
-//! N]` runs the named steps, or all that need no other programs; `cargo verify quick` runs the steps that take
-//! about a minute after a build.
+//! N]` runs the named steps, or all that need no other programs; `cargo verify quick` runs the steps that
+//! take about a minute after a build.
 #![forbid(unsafe_code)]
 
 mod bindings;
