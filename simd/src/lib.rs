@@ -1,6 +1,6 @@
 //! SIMD lanes, run-time levels and batch kernels.
 //!
-//! This is the only crate of the workspace with `unsafe`; all others forbid it. A kernel is written once,
+//! This crate alone has `unsafe`; `halflight-core` and `halflight` forbid it. A kernel is written once,
 //! generic over a [`Simd`] token, and entered once per batch through [`Level::dispatch`]. That call holds the
 //! only `#[target_feature]` functions, so that everything inlined below it is compiled for the level. The
 //! lanes of a level can only be made from its token, and the token only by `dispatch`: safe code cannot

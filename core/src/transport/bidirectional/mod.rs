@@ -9,8 +9,8 @@
 //!    scatters.
 //!
 //! The loop over samples is `RenderMethod::round` in `method/bidirectional`. Both walks carry the running
-//! sums of `walk/sums.rs`, which weight all techniques by [`Counts`]: without light paths the camera paths are
-//! path tracing, without connections both together are light tracing.
+//! sums of `walk/sums.rs`, which weight all techniques by [`Counts`]: without light paths the camera paths
+//! are path tracing, without connections both together are light tracing.
 //!
 //! A vertex is a *caster* if its surface reflects or transmits in a narrow lobe
 //! ([`Bsdf::is_caustic_caster`](crate::bsdf::Bsdf::is_caustic_caster)), and *rough* otherwise.
