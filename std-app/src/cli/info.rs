@@ -67,6 +67,8 @@ impl Info {
 struct CameraFacts {
     vectors: [(&'static str, [f64; 3]); 3],
     kind: ViewKind,
+    /// 0 of a pinhole.
+    lens_radius: f64,
 }
 
 impl CameraFacts {
@@ -87,7 +89,7 @@ impl CameraFacts {
             }
             CameraKind::Panorama => ViewKind::Panorama,
         };
-        Self { vectors, kind }
+        Self { vectors, kind, lens_radius: to_user(camera.lens_radius.into()) }
     }
 }
 
@@ -138,6 +140,7 @@ impl Facts<'_> {
         };
         camera.insert(key.into(), value);
         camera.insert("kind".into(), name_of(self.camera.kind).into());
+        camera.insert("lens_radius".into(), self.camera.lens_radius.into());
         let counts = self.counts.iter().map(|&(name, count)| (name.into(), count.into()));
         let memory = self.footprints.iter().map(|&(name, bytes)| (name.into(), bytes.into()));
         json!({
@@ -182,6 +185,9 @@ impl Facts<'_> {
                 lines.push(line("kind", format!("{}, height {height:.6}", name_of(self.camera.kind))));
             }
             ViewKind::Panorama => lines.push(line("kind", name_of(self.camera.kind).into())),
+        }
+        if self.camera.lens_radius > 0.0 {
+            lines.push(format!("  --{:<22} {:.6}", "lens", self.camera.lens_radius));
         }
         let named = |(number, camera): (usize, &NamedCamera)| {
             line("camera", format!("--camera {} ({})", number + 1, camera.name))

@@ -34,9 +34,9 @@ pub struct LightEntry {
     pub kind: LightKind,
     /// Position of a point or spot light.
     pub position: Option<[Number; 3]>,
-    /// Direction of the emission of a spot or directional light,
+    /// Direction of the emission of a spot or directional light.
     pub direction: Option<[Number; 3]>,
-    /// or a point on the axis of a spot light.
+    /// Point on the axis of a spot light, in place of the direction.
     pub look_at: Option<[Number; 3]>,
     /// Radiant intensity of a point or spot light, W/sr.
     pub intensity: Option<Colour>,
@@ -153,6 +153,10 @@ pub(super) fn light(
         let (from, to) = match (light.direction, light.look_at, from) {
             (Some(direction), None, _) => ([0.0; 3], direction),
             (None, Some(look_at), Some(from)) => (from, look_at),
+            (Some(_), Some(_), _) => {
+                let problem = "this light is directed in two ways";
+                return Err(source.error(entry.span(), problem, "give either `direction` or `look_at`"));
+            }
             _ => return Err(needs(if from.is_some() { "direction` or `look_at" } else { "direction" })),
         };
         let unit = direction_between(from, to.map(f64::from)).ok_or_else(|| {
