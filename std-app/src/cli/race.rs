@@ -172,7 +172,8 @@ impl Race {
         let mut lines = Vec::new();
         lines.extend(report.map(|folder| format!("report {}", folder.join("index.html").display())));
         let source = if race.has_reference() { "against the reference" } else { "estimated" };
-        lines.push(format!("errors {source}, {} of rendering each", readable_seconds(self.time)));
+        let early = if INTERRUPT.load(Ordering::Relaxed) { ", stopped early" } else { "" };
+        lines.push(format!("errors {source}, {} of rendering each{early}", readable_seconds(self.time)));
         let row = |cells: [String; 6]| {
             let [name, spp, error, efficiency, ratio, interval] = cells;
             let line =
