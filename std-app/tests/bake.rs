@@ -85,6 +85,8 @@ fn shards_of_a_bake_merge_to_the_bits_of_one() {
         ("merge 1.bake seed.bake 3.bake -o no.csv", "it is a bake of seed 9, not 0"),
         ("merge 1.bake few.bake 3.bake -o no.csv", "a bake of 8 samples, not of 24"),
         ("merge 1.bake picture.film -o no.csv", "picture.film: is no bake file"),
+        ("merge 1.bake 2.bake 3.bake -o no.csv --aov albedo", "--aov is for pictures"),
+        ("merge 1.bake 2.bake 3.bake -o no.csv --for-error 0.1", "--for-error is for pictures"),
         ("merge 1.bake 2.bake 3.bake -o no.png", "a table is .csv, .res or .ply"),
         ("bake scene.obj --points grid.pts --shard 1/3 --spp 4", "--checkpoint"),
         ("bake scene.obj --points grid.pts --shard 1/3 --error 0.1 --checkpoint a.bake", "--error"),

@@ -182,7 +182,7 @@ fn a_film_of_something_else_is_refused_with_the_reason() {
         ("film --seed 1", "a film of seed 0, not 1"),
         ("film --max-depth 3", "a film of max-depth unlimited, not 3"),
         ("film --fov 12", "another scene, or its camera changed since"),
-        ("missing", "missing: no such file"),
+        ("missing", "error: missing: no such file\n  help: give another file"),
     ] {
         let said = folder.refused(&format!("{resume} {more}"));
         assert!(said.contains(reason), "{more}: {said}");
@@ -200,6 +200,7 @@ fn a_film_of_something_else_is_refused_with_the_reason() {
             "checksum",
         ),
         ("empty", Vec::new(), "damaged"),
+        ("text", b"hello\n".to_vec(), "is no film file"),
     ] {
         fs::write(folder.path(name), bytes).unwrap();
         let said = folder.refused(&format!("{resume} {name}"));

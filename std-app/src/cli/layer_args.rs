@@ -29,6 +29,11 @@ impl LayerArgs {
         Layer::ALL.into_iter().filter(is_wanted).collect()
     }
 
+    /// True if layers are wanted.
+    pub(super) fn is_given(&self) -> bool {
+        !self.aov.is_empty()
+    }
+
     /// Refuses layers that no file can have.
     pub(super) fn check(&self, pictures: &[PathBuf]) -> Result<(), Failure> {
         let is_exr = |picture: &PathBuf| Format::of(picture).is_ok_and(|format| format == Format::Exr);

@@ -76,6 +76,15 @@ impl Merge {
 
     /// Merges bakes.
     fn run_bake(&self) -> Result<ExitCode, Failure> {
+        let of_pictures = [
+            ("--aov", self.layers.is_given()),
+            ("--exposure or --view", self.view.is_given()),
+            ("--for-error", self.for_error.is_some()),
+        ];
+        if let Some((flag, _)) = of_pictures.iter().find(|(_, is_given)| *is_given) {
+            let message = format!("{flag} is for pictures, and these films are parts of a bake");
+            return Err(Failure::new(message).advice("leave it out"));
+        }
         let mut outputs = Outputs::new(self.json);
         let merged = bake::merge(&self.films)?;
         let files = BakeFiles::new(&merged.subject, (&self.output, self.error_map.as_deref()))?;

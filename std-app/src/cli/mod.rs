@@ -31,7 +31,7 @@ mod viewer;
 
 pub use keywords::{Keywords, Refused};
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use failure::Failure;
 use halflight::memory::Budget;
 use halflight::pool::in_pool;
@@ -93,7 +93,7 @@ impl Command {
 pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::block_signals();
     panic::set_hook(Box::new(|panic| print_message(format_args!("internal error of halflight: {panic}"))));
-    let command = match Cli::try_parse_from(words) {
+    let command = match parse(words) {
         Ok(cli) => cli.command,
         Err(message) => return end_with(&message),
     };
@@ -109,6 +109,16 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
         Err(_) => print_message("  help: please report it, with the command and the scene"),
     }
     ExitCode::from(2)
+}
+
+/// The command line. Values may be negative numbers, so that a flag can say which numbers it takes.
+fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
+    let with_negative = |argument: Arg| match argument.get_action().takes_values() {
+        true => argument.allow_negative_numbers(true),
+        false => argument,
+    };
+    let command = Cli::command().mut_subcommands(|command| command.mut_args(with_negative));
+    Cli::from_arg_matches(&command.try_get_matches_from(words)?)
 }
 
 /// Picture in a file, whose pixels count in `budget`. Repairs are printed as notes.

@@ -386,6 +386,10 @@ pub(super) fn note_darkness(scene: &Scene) -> bool {
 pub(super) fn render_failure(scene: &Path, error: &RenderError) -> Failure {
     let failure = Failure::new(format!("{}: {error}", scene.display()));
     match error {
+        // The file has its own name.
+        RenderError::File(error) => {
+            Failure::new(error).advice("give another file, or leave out its flag to render anew")
+        }
         RenderError::Memory { needed, .. } => {
             failure.advice(format!("raise --memory to {needed}, or lower --size or --threads"))
         }

@@ -9,7 +9,10 @@ use halflight_simd::Tier;
 
 /// Number of a checked type.
 pub(super) fn checked<N: FromStr, T: TryFrom<N, Error = &'static str>>(text: &str) -> Result<T, String> {
-    let number: N = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
+    let number: N = text.trim().parse().map_err(|_| match text.trim().parse::<f64>() {
+        Ok(_) => format!("`{text}` is not a whole number of at least 0"),
+        Err(_) => format!("`{text}` is not a number"),
+    })?;
     Ok(number.try_into()?)
 }
 

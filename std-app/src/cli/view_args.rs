@@ -40,6 +40,11 @@ fn exposure(text: &str) -> Result<Exposure, String> {
 }
 
 impl ViewArgs {
+    /// True for another view than that of the values themselves.
+    pub(super) fn is_given(&self) -> bool {
+        self.exposure != Exposure::Stops(0.0) || self.view != Curve::default()
+    }
+
     /// The picture as PNG files show it.
     pub(super) fn of<'i>(&self, image: &'i Image) -> Cow<'i, Image> {
         self.transform(image).shown(image)

@@ -1,6 +1,8 @@
 //! Errors of scene files.
 
+use crate::support::Folder;
 use halflight::load::scene_file::parse;
+use std::fs;
 use std::path::Path;
 
 fn error(text: &str) -> String {
@@ -96,5 +98,20 @@ fn numbers_that_would_hide_something_are_refused() {
             let error = error(&format!("[material.a]\n{key} = {value}"));
             assert!(error.starts_with("a.toml:2:") && error.contains("between 0 and 1"), "{error}");
         }
+    }
+}
+
+#[test]
+fn keys_of_other_kinds_are_refused_at_the_light() {
+    let folder = Folder::new("light-keys");
+    for (keys, message) in [
+        ("kind = \"point\"\nposition = [0, 1, 0]\nirradiance = 3", "a point light has no `irradiance`"),
+        ("kind = \"directional\"\ndirection = [0, -1, 0]\nintensity = 3", "has no `intensity`"),
+        ("kind = \"spot\"\nposition = [0, 1, 0]\nirradiance = 3", "a spot light has no `irradiance`"),
+    ] {
+        let text = format!("[[mesh]]\nfile = \"scene.obj\"\n[[light]]\n{keys}\n");
+        fs::write(folder.path("a.toml"), text).unwrap();
+        let said = folder.refused("info a.toml");
+        assert!(said.contains(message) && said.contains("a.toml:3"), "{keys}: {said}");
     }
 }

@@ -93,6 +93,30 @@ impl EnvironmentChange {
 /// Error of a rotation matrix: files have six or more digits.
 const ROTATION_TOLERANCE: f64 = 1e-4;
 
+impl LightEntry {
+    /// A key that lights of this kind do not have, and those that they have.
+    fn foreign_key(&self) -> Option<(&'static str, &'static [&'static str])> {
+        let known: &[&str] = match self.kind {
+            LightKind::Point => &["position", "intensity"],
+            LightKind::Spot => {
+                &["position", "direction", "look_at", "intensity", "outer_degrees", "inner_degrees"]
+            }
+            LightKind::Directional => &["direction", "irradiance"],
+        };
+        let keys = [
+            ("position", self.position.is_some()),
+            ("direction", self.direction.is_some()),
+            ("look_at", self.look_at.is_some()),
+            ("intensity", self.intensity.is_some()),
+            ("irradiance", self.irradiance.is_some()),
+            ("outer_degrees", self.outer_degrees.is_some()),
+            ("inner_degrees", self.inner_degrees.is_some()),
+        ];
+        let foreign = keys.into_iter().find(|(key, is_given)| *is_given && !known.contains(key));
+        foreign.map(|(key, _)| (key, known))
+    }
+}
+
 impl EnvironmentEntry {
     pub(super) fn resolved(&self, source: &Source) -> Result<EnvironmentChange, LoadError> {
         let to_world = match (&self.rotate, &self.to_world) {
@@ -130,8 +154,13 @@ pub(super) fn light(
     source: &Source,
 ) -> Result<PointLight, LoadError> {
     let light = entry.get_ref();
+    let kind = format!("{:?}", light.kind).to_lowercase();
+    if let Some((key, known)) = light.foreign_key() {
+        let help = format!("it has `{}`", known.join("`, `"));
+        return Err(source.error(entry.span(), format!("a {kind} light has no `{key}`"), help));
+    }
     let needs = |key: &str| {
-        let problem = format!("this {} light needs `{key}`", format!("{:?}", light.kind).to_lowercase());
+        let problem = format!("this {kind} light needs `{key}`");
         source.error(entry.span(), problem, "docs/scene-file.md has an example of each kind")
     };
     let position = || light.position.map(|p| p.map(f64::from)).ok_or_else(|| needs("position"));

@@ -113,11 +113,14 @@ impl<'r> Reader<'r> {
         most: usize,
     ) -> Result<(Self, H), FileError> {
         let mut reader = Self { path: path.to_owned(), file, length, most, hash: Hash::default() };
-        let mut opening = [0; 12];
-        reader.get(&mut opening)?;
-        if opening[..6] != kind.magic {
+        let mut opening = Vec::new();
+        let limited = reader.file.by_ref().take(12).read_to_end(&mut opening);
+        limited.map_err(|error| FileError::io(&error).at(path))?;
+        if !kind.magic.starts_with(&opening[..opening.len().min(kind.magic.len())]) {
             return Err(reader.refusal(format!("is no {} file", kind.name)));
         }
+        let Ok(opening) = <[u8; 12]>::try_from(opening) else { return Err(reader.damage("it is too short")) };
+        reader.hash.section(&opening);
         if opening != kind.opening() {
             let version = u16::from_be_bytes([opening[6], opening[7]]);
             let what = match version == u16::from(kind.version) {
