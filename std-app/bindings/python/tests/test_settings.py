@@ -43,6 +43,13 @@ def test_settings_that_do_not_exist_are_refused_with_the_nearest(floor, name, va
     assert hint in str(refused.value)
 
 
+def test_other_work_refuses_unknown_settings_too(floor):
+    with pytest.raises(hl.SettingsError, match="there is no setting `errors`\n.*did you mean `error`"):
+        floor.irradiance([[0, 1, 0]], (0, 1, 0), errors=0.1)
+    with pytest.raises(hl.SettingsError, match="there is no setting `samples`"):
+        floor.bake_lightmap((8, 8), samples=4)
+
+
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [

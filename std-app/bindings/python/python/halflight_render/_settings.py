@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
@@ -102,14 +102,7 @@ def settings() -> list[str]:
 
 def words(given: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Keywords and values as flags and their text."""
-    known = _names()
-    for name in given:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, 1, 0.5)
-            hint = f"did you mean `{near[0]}`?" if near else f"the settings are {', '.join(known)}"
-            if name in RENAMED.values():
-                hint = f"did you mean `{names_of(name)}`?"
-            raise SettingsError(f"there is no setting `{name}`\n  help: {hint}", help=hint)
+    refuse_unknown(given, _names())
     flags: list[tuple[str, str]] = []
     for name, value in given.items():
         if value is None or name in OWN:
@@ -119,6 +112,17 @@ def words(given: Mapping[str, Any]) -> list[tuple[str, str]]:
         else:
             flags.append((RENAMED.get(name, name), text(name, value)))
     return flags
+
+
+def refuse_unknown(given: Iterable[str], known: Sequence[str]) -> None:
+    """Refuses names that are no settings, with the nearest one."""
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1, 0.5)
+            hint = f"did you mean `{near[0]}`?" if near else f"the settings are {', '.join(known)}"
+            if name in RENAMED.values() and names_of(name) in known:
+                hint = f"did you mean `{names_of(name)}`?"
+            raise SettingsError(f"there is no setting `{name}`\n  help: {hint}", help=hint)
 
 
 def names_of(flag: str) -> str:

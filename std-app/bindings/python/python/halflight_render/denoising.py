@@ -97,26 +97,28 @@ def denoise(
     both = _applied(apply, mean)
     weight = _weight(both, mean, variance)
     if len(parts) == 4:
-        errors, noisy = _of_four(apply, parts) * weight, variance * weight
+        squares, noise = _of_four(apply, parts), variance
     else:
-        (a, b), of_part = parts, 2 * variance
-        errors = ((_applied(apply, a) - b) ** 2 + (_applied(apply, b) - a) ** 2) / 2 - of_part
-        errors, noisy = errors * weight, of_part * weight
-    blocks, deviations = _blocks(errors.mean(axis=2))
-    found, deviation = _mean(errors)
+        (a, b), noise = parts, 2 * variance
+        squares = ((_applied(apply, a) - b) ** 2 + (_applied(apply, b) - a) ** 2) / 2 - noise
+    blocks, deviations = _blocks((squares * weight).mean(axis=2))
+    found, deviation = _mean(squares * weight)
+    # Nobody knows whether a dark pixel among bright ones lacks light or luck: here it lacks light.
+    darkest = np.minimum(np.abs(both), np.abs(mean) + QUANTILE * np.sqrt(variance))
+    most, _ = _mean(squares * _inverse_square(darkest, mean))
     # A picture of all that is worse than those of parts: its error correlates with its own noise, so that this is a
     # lower estimate.
-    least, noise = _mean(np.mean([(both - a) * (both - b) for a, b in combinations(parts, 2)], axis=0) * weight)
-    relmse, deviation = max((found, deviation), (least - QUANTILE * noise, noise))
+    least, spread = _mean(np.mean([(both - a) * (both - b) for a, b in combinations(parts, 2)], axis=0) * weight)
+    relmse, deviation = max((found, deviation), (least - QUANTILE * spread, spread))
     lower = max(relmse - QUANTILE * deviation, 0.0) if len(parts) == 4 else 0.0
     return Denoised(
         image=both.astype(np.float32),
         relmse=max(relmse, 0.0),
-        interval=(lower, relmse + QUANTILE * deviation),
+        interval=(lower, max(relmse + QUANTILE * deviation, most)),
         noisy_relmse=float((variance * weight).mean()),
         blocks=blocks,
         block_errors=deviations,
-        noisy_blocks=_blocks(noisy.mean(axis=2))[0],
+        noisy_blocks=_blocks((noise * weight).mean(axis=2))[0],
         denoiser=apply,
     )
 
@@ -156,7 +158,8 @@ def _of_four(apply: Callable[[Pixels], Pixels], parts: NDArray[np.float64]) -> N
             step += (of_two[pair] - found) * (of_two[pair] + found - 2 * parts[left]) / 12
     # Errors that fall as the power -3/4 of the parts fall from 3 to 4 parts by 0.55 of their fall from 2 to 3; powers
     # from -1/2 to -1 by 0.59 to 0.5.
-    return squares - 1.55 * step
+    errors: NDArray[np.float64] = squares - 1.55 * step
+    return errors
 
 
 def _weight(
@@ -172,7 +175,12 @@ def _weight(
         noise = np.sqrt(_box(variance, side) if side > 1 else np.maximum(variance, _box(variance, 5))) / side
         theirs, ours = np.maximum(_box(mean, side), 0), np.maximum(_box(both, side), 1e-30)
         size = np.where(np.abs(ours - theirs) > SURE * noise, theirs / ours, size)
-    weight: NDArray[np.float64] = 1 / ((both * size) ** 2 + 0.01 * mean.mean() ** 2)
+    return _inverse_square(both * size, mean)
+
+
+def _inverse_square(pixels: NDArray[np.float64], mean: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights of relMSE for a reference of these pixels."""
+    weight: NDArray[np.float64] = 1 / (pixels**2 + 0.01 * mean.mean() ** 2)
     return weight
 
 
