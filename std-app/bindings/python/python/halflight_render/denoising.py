@@ -25,8 +25,8 @@ BLOCK = 16
 Pixels = NDArray[np.float32]
 
 
-#: Half-width of intervals, in standard errors, and the largest factor between the estimate and an end of its interval
-#: with which an error is known.
+#: Half-width of intervals, in standard errors, and the largest factor between the estimate and the upper end of its
+#: interval with which an error is known.
 QUANTILE = 2.0
 WITHIN = 1.3
 
@@ -34,7 +34,7 @@ WITHIN = 1.3
 SURE = 3.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Denoised:
     """A denoised picture and where its error lies."""
 
@@ -56,9 +56,14 @@ class Denoised:
 
     @property
     def known(self) -> bool:
-        """True if the interval is within a factor of 1.3 of `relmse`."""
+        """True if the interval ends within a factor of 1.3 above `relmse`."""
         lower, upper = self.interval
-        return lower * WITHIN >= self.relmse and upper <= WITHIN * self.relmse
+        return lower > 0 and upper <= WITHIN * self.relmse
+
+    def __repr__(self) -> str:
+        (lower, upper), (rows, columns, _) = self.interval, self.image.shape
+        text = "known" if self.known else "not known"
+        return f"<Denoised {columns}×{rows}, relMSE {self.relmse:.2e}, 95 %: {lower:.2e} to {upper:.2e}, {text}>"
 
     def of(self, picture: Picture) -> Pixels:
         """Another picture of the view, denoised in the same way."""
