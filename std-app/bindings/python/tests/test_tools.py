@@ -69,6 +69,8 @@ def test_one_origin_or_direction_serves_all_rays(cornell):
     assert repr(hits).startswith("<Hits of 20 rays, ")
     assert len(cornell.trace(np.tile(center, (3, 1)), (0, -1, 0))) == 3
     assert cornell.occluded(center, ways).shape == (20,)
+    with pytest.raises(hl.SettingsError, match="directions have the shape"):
+        cornell.trace(center, ways[:, :2])
     with pytest.raises(hl.SettingsError, match=r"reshape\(-1, 3\)"):
         cornell.irradiance(np.zeros((2, 2, 3)), (0, 1, 0))
     assert "points, mean" in repr(cornell.irradiance([center], (0, 1, 0), spp=4))

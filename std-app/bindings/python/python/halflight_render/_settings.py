@@ -82,6 +82,9 @@ class Settings(TypedDict, total=False):
 #: Keywords with another name than their flag.
 RENAMED = {"seconds": "time", "layers": "aov"}
 
+#: Names of settings in other programs.
+ELSEWHERE = {"samples": "spp", "sample": "spp", "width": "size", "height": "size", "resolution": "size"}
+
 #: Keywords that are no flags.
 OWN = ("reference", "progress")
 
@@ -120,8 +123,9 @@ def refuse_unknown(given: Iterable[str], known: Sequence[str]) -> None:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1, 0.5)
             hint = f"did you mean `{near[0]}`?" if near else f"the settings are {', '.join(known)}"
-            if name in RENAMED.values() and names_of(name) in known:
-                hint = f"did you mean `{names_of(name)}`?"
+            meant = names_of(name) if name in RENAMED.values() else ELSEWHERE.get(name)
+            if meant in known:
+                hint = f"did you mean `{meant}`?"
             raise SettingsError(f"there is no setting `{name}`\n  help: {hint}", help=hint)
 
 
