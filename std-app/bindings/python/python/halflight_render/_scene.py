@@ -334,8 +334,8 @@ def _rays(
     """Positions and directions, (n, 3) each; a single one of three numbers serves all of the others."""
     given = [np.asarray(values, np.float64) for values in (starts, ways)]
     shape = max((array.shape for array in given), key=len)
-    if len(shape) == 2 and shape[1] == 3:
-        given = [np.broadcast_to(array, shape) if array.shape == (3,) else array for array in given]
+    if len(shape) == 2:
+        given = [np.broadcast_to(array, (shape[0], 3)) if array.shape == (3,) else array for array in given]
     first, second = (rows64(array, name) for array, name in zip(given, names, strict=True))
     return first, second
 
