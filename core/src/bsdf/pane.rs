@@ -6,8 +6,8 @@
 //!
 //! R = r + r (1 - r)² τ² / (1 - r² τ²), T = (1 - r)² τ / (1 - r² τ²).
 //!
-//! Both faces have the same plane of incidence, so that each polarisation keeps its own r: R and T are means of
-//! those of both. With the mean of r instead, T would be 2.4 % too small at 66° and index 1.52.
+//! Both faces have the same plane of incidence, so that each polarisation keeps its own r: R and T are means
+//! of those of both. With the mean of r instead, T would be 2.4 % too small at 66° and index 1.52.
 //!
 //! Straight on, a ray skips the pane as a cut-out of opacity 1 - max T, so that light samples pass it too;
 //! else it is mirrored. Clear and grey panes change no throughput where rays pass.
