@@ -6,6 +6,9 @@
 //!
 //! R = r + r (1 - r)² τ² / (1 - r² τ²), T = (1 - r)² τ / (1 - r² τ²).
 //!
+//! Both faces have the same plane of incidence, so that each polarisation keeps its own r: R and T are means
+//! of those of both. With the mean of r instead, T would be 2.4 % too small at 66° and index 1.52.
+//!
 //! Straight on, a ray skips the pane as a cut-out of opacity 1 - max T, so that light samples pass it too;
 //! else it is mirrored. Clear and grey panes change no throughput where rays pass.
 
@@ -44,22 +47,28 @@ impl Pane {
     #[inline]
     pub fn parts(&self, c: f32) -> [Rgb; 2] {
         let c = c.abs().min(1.0);
-        let r = fresnel::dielectric(c, self.ior);
-        if !(r < 1.0) {
-            return [Rgb::ONE, Rgb::ZERO];
-        }
+        let g2 = fresnel::square_g(c, self.ior);
         let body = if self.tint == Rgb::ONE { Rgb::ONE } else { self.body(c) };
-        let inner = r * body;
-        // (1 - r τ)(1 + r τ) keeps the digits that 1 - r² τ² loses at grazing incidence.
-        let passing = (1.0 - r) * (1.0 - r) * body / ((Rgb::ONE - inner) * (Rgb::ONE + inner));
-        [Rgb::splat(r) + inner * passing, passing]
+        let of_face = |r: f32| match r < 1.0 {
+            true => {
+                let inner = r * body;
+                // (1 - r τ)(1 + r τ) keeps the digits that 1 - r² τ² loses at grazing incidence.
+                let passing = (1.0 - r) * (1.0 - r) * body / ((Rgb::ONE - inner) * (Rgb::ONE + inner));
+                [Rgb::splat(r) + inner * passing, passing]
+            }
+            false => [Rgb::ONE, Rgb::ZERO],
+        };
+        let [s, p] = fresnel::polarized(c, super::sqrt(g2), self.ior).map(of_face);
+        [0.5 * (s[0] + p[0]), 0.5 * (s[1] + p[1])]
     }
 
     /// Transmittance of the body, whose path is longer by 1 / cos θ_t.
     fn body(&self, c: f32) -> Rgb {
         let cos_inside = super::sqrt(1.0 - (1.0 - c * c) / (self.ior * self.ior));
         let power = |tint: f32| libm::powf(tint, 1.0 / cos_inside);
-        Rgb::new(power(self.tint.x), power(self.tint.y), power(self.tint.z))
+        let Rgb { x, y, z } = self.tint;
+        // Most panes are grey.
+        if x == y && y == z { Rgb::splat(power(x)) } else { Rgb::new(power(x), power(y), power(z)) }
     }
 
     /// Factor on the throughput of mirrored rays: R over their probability, 1 - max T.
@@ -84,14 +93,36 @@ mod tests {
         let inside = (1.0 - (1.0 - c * c) / (ior * ior)).sqrt();
         let s = ((c - ior * inside) / (c + ior * inside)).powi(2);
         let p = ((ior * c - inside) / (ior * c + inside)).powi(2);
-        let (r, body) = (0.5 * (s + p), tint.powf(1.0 / inside));
-        let mut parts = [r, 0.0];
-        let mut light = (1.0 - r) * body;
-        for i in 0..100_000 {
-            parts[(i + 1) % 2] += light * (1.0 - r);
-            light *= r * body;
+        let body = tint.powf(1.0 / inside);
+        let mut parts = [0.0; 2];
+        for r in [s, p] {
+            parts[0] += 0.5 * r;
+            let mut light = 0.5 * (1.0 - r) * body;
+            for i in 0..100_000 {
+                parts[(i + 1) % 2] += light * (1.0 - r);
+                light *= r * body;
+            }
         }
         parts
+    }
+
+    /// Numbers of rtrace (Radiance 6) for `glass` of index 1.52 and a transmissivity of 0.9, at 0°, 30°, 45°,
+    /// 60°, 66°, 75° and 85°.
+    #[test]
+    fn parts_are_those_of_a_window_of_radiance() {
+        let pane = Pane::new(1.52, Rgb::splat(0.9));
+        for (degrees, reflected, passing) in [
+            (0.0f32, 0.074_242, 0.826_201),
+            (30.0, 0.076_045, 0.818_899),
+            (45.0, 0.087_998, 0.800_514),
+            (60.0, 0.141_661, 0.739_607),
+            (66.0, 0.194_965, 0.684_076),
+            (75.0, 0.351_452, 0.527_090),
+            (85.0, 0.706_348, 0.188_190),
+        ] {
+            let [r, t] = pane.parts(degrees.to_radians().cos()).map(|part| part.x);
+            assert!((r - reflected).abs() < 1e-5 && (t - passing).abs() < 1e-5, "{degrees}: {r} {t}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub fn dielectric<L: Lanes>(c: L, eta: L) -> L {
 /// g² = (eta cos θ_t)², below zero at total reflection. (eta - 1)(eta + 1) keeps the digits that eta² - 1
 /// loses near 1.
 #[inline(always)]
-fn square_g<L: Lanes>(c: L, eta: L) -> L {
+pub fn square_g<L: Lanes>(c: L, eta: L) -> L {
     let one = c.all(1.0);
     (eta - one) * (eta + one) + c * c
 }
@@ -23,10 +23,18 @@ fn square_g<L: Lanes>(c: L, eta: L) -> L {
 /// [`dielectric`] for known g = eta cos θ_t: without cancellation near the onset of total reflection.
 #[inline(always)]
 pub fn between<L: Lanes>(c: L, g: L, eta: L) -> L {
+    let [s, p] = polarized(c, g, eta);
+    c.all(0.5) * (s + p)
+}
+
+/// Reflectances of light polarised perpendicular and parallel to the plane of incidence, for known
+/// g = eta cos θ_t.
+#[inline(always)]
+pub fn polarized<L: Lanes>(c: L, g: L, eta: L) -> [L; 2] {
     let r_s = (c - g) / (c + g);
     let eta2_c = eta * eta * c;
     let r_p = (eta2_c - g) / (eta2_c + g);
-    c.all(0.5) * (r_s * r_s + r_p * r_p)
+    [r_s * r_s, r_p * r_p]
 }
 
 /// Probability of reflection, in proportion to the energy of each side.

@@ -5,6 +5,7 @@ use crate::error::{invalid, raised};
 use crate::irradiance::{PointKeywords, state};
 use crate::scene::Renderer;
 use crate::watch::watched;
+use core::sync::atomic::Ordering;
 use halflight::bake::{self, BakeProgress, LightMap, LightmapSettings, Quantity, Texel};
 use halflight::save::{Format, Patience, write_bytes};
 use numpy::{PyArray2, PyArray4};
@@ -44,7 +45,13 @@ pub(crate) fn lightmap<'py>(
     let views = loaded.views();
     let mut budget = bake::budget(&views.scene(loaded.camera_or_default()), renderer.memory);
     let before = budget.left();
-    let texels = py.detach(|| bake::Lightmap::new(loaded, settings, &mut budget));
+    let (texels, ended) = watched(py, None, |_, interrupt| {
+        let mut watch = |_| !interrupt.load(Ordering::Relaxed);
+        bake::Lightmap::new(loaded, settings, &mut budget, &mut watch)
+    })?;
+    if let Some(error) = ended {
+        return Err(error);
+    }
     let texels = texels.map_err(|error| invalid(py, &format!("{error}\n  help: {}", error.advice())))?;
     let left = budget.limit() + budget.left() - before;
     let settings = keywords.settings(py, Some(left))?;

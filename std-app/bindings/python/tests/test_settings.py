@@ -34,6 +34,7 @@ def test_typed_settings_are_those_of_the_program():
         ("second", 1, "did you mean `seconds`?"),
         ("time", 1, "did you mean `seconds`?"),
         ("cach_error", 1, "did you mean `cache_error`?"),
+        ("samples", 1, "did you mean `spp`?"),
         ("xyzzy", 1, "the settings are "),
     ],
 )
@@ -41,6 +42,13 @@ def test_settings_that_do_not_exist_are_refused_with_the_nearest(floor, name, va
     with pytest.raises(hl.SettingsError, match=f"there is no setting `{name}`") as refused:
         floor.render(**{name: value})
     assert hint in str(refused.value)
+
+
+def test_other_work_refuses_unknown_settings_too(floor):
+    with pytest.raises(hl.SettingsError, match="there is no setting `errors`\n.*did you mean `error`"):
+        floor.irradiance([[0, 1, 0]], (0, 1, 0), errors=0.1)
+    with pytest.raises(hl.SettingsError, match="did you mean `spp`"):
+        floor.bake_lightmap((8, 8), samples=4)
 
 
 @pytest.mark.parametrize(

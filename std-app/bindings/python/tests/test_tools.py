@@ -61,6 +61,21 @@ def test_comparisons_are_those_of_their_formulas():
         hl.flip(image[..., 0], reference[..., 0])
 
 
+def test_one_origin_or_direction_serves_all_rays(cornell):
+    low, high = np.array(cornell.bounds)
+    center, ways = (low + high) / 2, np.random.default_rng(0).normal(size=(20, 3))
+    hits = cornell.trace(center, ways)
+    assert np.array_equal(hits.t, cornell.trace(np.tile(center, (20, 1)), ways).t)
+    assert repr(hits).startswith("<Hits of 20 rays, ")
+    assert len(cornell.trace(np.tile(center, (3, 1)), (0, -1, 0))) == 3
+    assert cornell.occluded(center, ways).shape == (20,)
+    with pytest.raises(hl.SettingsError, match="directions have the shape"):
+        cornell.trace(center, ways[:, :2])
+    with pytest.raises(hl.SettingsError, match=r"reshape\(-1, 3\)"):
+        cornell.irradiance(np.zeros((2, 2, 3)), (0, 1, 0))
+    assert "points, mean" in repr(cornell.irradiance([center], (0, 1, 0), spp=4))
+
+
 def test_types_are_strict(tmp_path):
     pytest.importorskip("mypy")
     use = tmp_path / "use.py"

@@ -43,6 +43,8 @@ enum When {
     Named,
     /// The run of the interfaces for other languages, which need compilers and browsers of their own.
     Bindings,
+    /// The full run, and that of the interfaces for other languages.
+    WholeAndBindings,
 }
 
 /// The name of all quick steps.
@@ -80,7 +82,7 @@ const STEPS: &[Step] = &[
     step("c", "programs in C and C++ call the library", bindings::c, When::Bindings),
     step("web", "the module for browsers: bits, types, its page", bindings::web, When::Bindings),
     step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
-    step("python", "the wheel of the Python package passes its tests", python::check, When::Bindings),
+    step("python", "the wheel of the Python package passes its tests", python::check, When::WholeAndBindings),
     step("cluster", "parts under Slurm and others: bits of one run", cluster::check, When::Named),
     step("package", "published crates: features, packages, oldest versions", package::check, When::Named),
     step("unit", "unit tests of core and simd", quality::unit, When::Quick),
@@ -124,11 +126,11 @@ fn main() -> ExitCode {
 
     let is_named = |step: &Step, name: &String| match name.as_str() {
         QUICK => matches!(step.when, When::Always | When::Quick),
-        BINDINGS => step.when == When::Bindings,
+        BINDINGS => matches!(step.when, When::Bindings | When::WholeAndBindings),
         name => name == step.name,
     };
     let chosen = STEPS.iter().filter(|step| match names.is_empty() {
-        true => matches!(step.when, When::Always | When::Whole),
+        true => matches!(step.when, When::Always | When::Whole | When::WholeAndBindings),
         false => names.iter().any(|name| is_named(step, name)),
     });
     let results: Vec<_> = chosen.map(|step| run(step, &project, allow_missing)).collect();

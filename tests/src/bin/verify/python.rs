@@ -5,6 +5,7 @@ use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+use std::thread;
 
 /// The package.
 const PACKAGE: &str = "std-app/bindings/python";
@@ -12,8 +13,11 @@ const PACKAGE: &str = "std-app/bindings/python";
 /// Largest wheel in bytes.
 const MAX_WHEEL: u64 = 6 << 20;
 
-/// Packages of the environment: the builder, and those of the tests and notebooks.
-const TOOLS: &str = "maturin>=1.9,<2 numpy pytest mypy nbclient ipykernel matplotlib pyradiance pyoidn";
+/// Packages of the environment that the build needs: the builder, and an installer that is quicker than pip.
+const BUILDERS: &str = "maturin>=1.9,<2 uv";
+
+/// Packages of the tests and notebooks.
+const TOOLS: &str = "numpy pytest mypy nbclient ipykernel matplotlib pyradiance pyoidn";
 
 /// Builds the wheel and runs pytest. The package shares the folder of products with the root workspace.
 pub(crate) fn check(project: &Project) -> Outcome {
@@ -24,7 +28,6 @@ pub(crate) fn check(project: &Project) -> Outcome {
         return Err(Failure::Missing(text.to_owned()));
     }
     let package = project.root.join(PACKAGE);
-    run(&mut command(&package, "cargo clippy --quiet --locked --profile quick -- -D warnings"))?;
     let target = project.root.join("target");
     let (venv, wheels) = (target.join("python/venv"), target.join("python/wheels"));
     for folder in [&venv, &wheels] {
@@ -33,14 +36,24 @@ pub(crate) fn check(project: &Project) -> Outcome {
     let venv_path = venv.to_string_lossy();
     run(command(&package, "python3 -m venv").arg(&*venv_path))?;
     let tool = |name: &str| venv.join("bin").join(name).to_string_lossy().into_owned();
-    let pip = "-m pip install --quiet --disable-pip-version-check";
-    let install = |what: &[String]| run(command(&package, &format!("{} {pip}", tool("python"))).args(what));
-    install(&TOOLS.split(' ').map(str::to_owned).collect::<Vec<_>>())?;
-
-    let line =
-        format!("{} build --quiet --profile quick --locked --compression-level 9 --out", tool("maturin"));
-    let mut build = fresh_cargo(&package, &line);
-    run(build.arg(&wheels))?;
+    let pip = format!("{} -m pip install --quiet --disable-pip-version-check", tool("python"));
+    run(command(&package, &pip).args(BUILDERS.split(' ')))?;
+    let install = |what: &[String]| {
+        let uv = format!("{} pip install --quiet --python {}", tool("uv"), tool("python"));
+        run(command(&package, &uv).args(what))
+    };
+    let build = || {
+        run(&mut command(&package, "cargo clippy --quiet --locked --profile quick -- -D warnings"))?;
+        let maturin = tool("maturin");
+        let line = format!("{maturin} build --quiet --profile quick --locked --compression-level 9 --out");
+        run(fresh_cargo(&package, &line).arg(&wheels))
+    };
+    // The network and the compiler work at the same time.
+    let tools: Vec<_> = TOOLS.split(' ').map(str::to_owned).collect();
+    thread::scope(|scope| {
+        let installed = scope.spawn(|| install(&tools));
+        build().and(installed.join().expect("the installation does not panic"))
+    })?;
     let wheel = only_wheel(&wheels)?;
     let bytes = fs::metadata(&wheel).map_or(0, |wheel| wheel.len());
     if bytes > MAX_WHEEL {

@@ -71,5 +71,6 @@ def _rows(array: NDArray[Any], name: str, columns: int) -> NDArray[Any]:
     if array.size == 0:
         return array.reshape(0, columns)
     if array.ndim != 2 or array.shape[1] != columns:
-        raise SettingsError(f"{name} have the shape {array.shape}; (n, {columns}) is expected")
+        hint = f", as of values.reshape(-1, {columns})" if array.shape[-1:] == (columns,) else ""
+        raise SettingsError(f"{name} have the shape {array.shape}; (n, {columns}) is expected{hint}")
     return array

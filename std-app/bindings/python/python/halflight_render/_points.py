@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from . import _halflight
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Irradiance:
     """Irradiance of n points in W/m², each value with its 95 % interval."""
 
@@ -42,8 +42,15 @@ class Irradiance:
     def __len__(self) -> int:
         return len(self.value)
 
+    def __repr__(self) -> str:
+        if not len(self):
+            return "<Irradiance of 0 points>"
+        mean, half = float(self.value.mean()), float(np.median(self.upper - self.lower)) / 2
+        text = f"mean {mean:.3g} W/m², intervals of ±{half:.2g}, {self.seconds:.2g} s"
+        return f"<Irradiance of {len(self)} points, {text}>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Hits:
     """Nearest hits of n rays."""
 
@@ -65,6 +72,9 @@ class Hits:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"<Hits of {len(self)} rays, {int(self.hit.sum())} on triangles>"
 
 
 def read_points(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from inspect import signature
+from typing import TYPE_CHECKING, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ from ._materials import Material, Triple, parts
 from ._picture import Picture
 from ._points import Hits, Irradiance
 from ._progress import shown
-from ._settings import Settings, words
+from ._settings import Settings, refuse_unknown, words
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -68,7 +69,7 @@ class Scene:
 
     def __init__(
         self,
-        meshes: Sequence[Mesh],
+        meshes: Sequence[Mesh] | Mesh,
         lights: Sequence[Light] = (),
         *,
         environment: ArrayLike | Environment | Sky | None = None,
@@ -82,7 +83,7 @@ class Scene:
         """
         materials: dict[Material, int] = {}
         given = []
-        for number, mesh in enumerate(meshes):
+        for number, mesh in enumerate([meshes] if isinstance(meshes, Mesh) else meshes):
             material = materials.setdefault(mesh.material, len(materials))
             name = mesh.name or f"mesh {number}"
             normals = None if mesh.normals is None else rows64(mesh.normals, f"normals of {name}")
@@ -205,16 +206,15 @@ class Scene:
         back_faces: bool = False,
         method: PointMethod = "path",
         progress: Callable[[_halflight.Progress], object] | bool | None = None,
+        **unknown: NoReturn,
     ) -> Irradiance:
         """Irradiance of points, (n, 3), on the side of their normals, (n, 3), or one normal for all.
 
         `error` is the half-width of the intervals of 95 % of the points of each tile of near points, relative to the
         value and a tenth of the mean. Without `spp`, `seconds` and `error`: 2 %, or a minute.
         """
-        places = rows64(points, "points")
-        directions = np.asarray(normals, np.float64)
-        if directions.ndim == 1:
-            directions = np.broadcast_to(directions, places.shape)
+        _refuse_others(Scene.irradiance, unknown)
+        places, directions = _rays(points, normals, "points", "normals")
         keywords = _positive(
             spp=spp,
             seconds=seconds,
@@ -229,7 +229,7 @@ class Scene:
         )
         with shown(progress) as callback:
             baked, ended = _halflight.irradiance(
-                self._renderer, places, rows64(directions, "normals"), keywords, callback
+                self._renderer, places, directions, keywords, callback
             )
         found = Irradiance(
             rgb=baked["rgb"],
@@ -267,12 +267,14 @@ class Scene:
         threads: int | None = None,
         method: PointMethod = "path",
         progress: Callable[[_halflight.Progress], object] | bool | None = None,
+        **unknown: NoReturn,
     ) -> Lightmap:
         """Irradiance of the texels of a map of `size` (columns, rows) over the texture coordinates.
 
         `subject` is the name of a mesh, an object or a material; None is all. The end is that of `irradiance`. A scene
         of a file is opened with `charts=True`.
         """
+        _refuse_others(Scene.bake_lightmap, unknown)
         if not self._has_charts:
             raise SettingsError("texture coordinates of files are kept by `hl.open(path, charts=True)` alone")
         columns, rows = size
@@ -303,26 +305,46 @@ class Scene:
         return found
 
     def trace(self, origins: ArrayLike, directions: ArrayLike) -> Hits:
-        """Nearest hits of rays, (n, 3) each. Cut-outs and panes count as whole triangles."""
-        t, triangle, weights, normal, material = self._renderer.trace(
-            rows64(origins, "origins"), rows64(directions, "directions")
-        )
+        """Nearest hits of rays, (n, 3) each, or one origin or direction for all. Cut-outs and panes count as whole
+        triangles.
+        """
+        rays = _rays(origins, directions, "origins", "directions")
+        t, triangle, weights, normal, material = self._renderer.trace(*rays)
         return Hits(t, triangle, weights, normal, material)
 
     def occluded(
         self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf
     ) -> NDArray[np.bool_]:
         """True for each ray that hits anything within `t_max` lengths of its direction, (n,)."""
-        starts = rows64(origins, "origins")
+        starts, ways = _rays(origins, directions, "origins", "directions")
         limits = np.asarray(t_max, np.float64)
         every = None if limits.ndim == 0 and np.isinf(limits) else np.broadcast_to(limits, len(starts)).tolist()
-        return self._renderer.occluded(starts, rows64(directions, "directions"), every)
+        return self._renderer.occluded(starts, ways, every)
 
     def __repr__(self) -> str:
         return f"<Scene of {len(self.triangles)} triangles>"
 
 
 PointMethod = Literal["path", "irradiance-cache", "auto"]
+
+
+def _rays(
+    starts: ArrayLike, ways: ArrayLike, *names: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions and directions, (n, 3) each; a single one of three numbers serves all of the others."""
+    given = [np.asarray(values, np.float64) for values in (starts, ways)]
+    shape = max((array.shape for array in given), key=len)
+    if len(shape) == 2:
+        given = [np.broadcast_to(array, (shape[0], 3)) if array.shape == (3,) else array for array in given]
+    first, second = (rows64(array, name) for array, name in zip(given, names, strict=True))
+    return first, second
+
+
+def _refuse_others(function: Callable[..., object], unknown: Mapping[str, object]) -> None:
+    """Refuses keywords that `function` does not name, with the nearest one."""
+    if unknown:
+        known = signature(function).parameters.values()
+        refuse_unknown(unknown, [setting.name for setting in known if setting.kind == setting.KEYWORD_ONLY])
 
 
 def _positive(**keywords: object) -> dict[str, object]:

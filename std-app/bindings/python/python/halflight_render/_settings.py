@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
@@ -82,6 +82,9 @@ class Settings(TypedDict, total=False):
 #: Keywords with another name than their flag.
 RENAMED = {"seconds": "time", "layers": "aov"}
 
+#: Names of settings in other programs.
+ELSEWHERE = {"samples": "spp", "sample": "spp", "width": "size", "height": "size", "resolution": "size"}
+
 #: Keywords that are no flags.
 OWN = ("reference", "progress")
 
@@ -102,14 +105,7 @@ def settings() -> list[str]:
 
 def words(given: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Keywords and values as flags and their text."""
-    known = _names()
-    for name in given:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, 1, 0.5)
-            hint = f"did you mean `{near[0]}`?" if near else f"the settings are {', '.join(known)}"
-            if name in RENAMED.values():
-                hint = f"did you mean `{names_of(name)}`?"
-            raise SettingsError(f"there is no setting `{name}`\n  help: {hint}", help=hint)
+    refuse_unknown(given, _names())
     flags: list[tuple[str, str]] = []
     for name, value in given.items():
         if value is None or name in OWN:
@@ -119,6 +115,18 @@ def words(given: Mapping[str, Any]) -> list[tuple[str, str]]:
         else:
             flags.append((RENAMED.get(name, name), text(name, value)))
     return flags
+
+
+def refuse_unknown(given: Iterable[str], known: Sequence[str]) -> None:
+    """Refuses names that are no settings, with the nearest one."""
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1, 0.5)
+            hint = f"did you mean `{near[0]}`?" if near else f"the settings are {', '.join(known)}"
+            meant = names_of(name) if name in RENAMED.values() else ELSEWHERE.get(name)
+            if meant in known:
+                hint = f"did you mean `{meant}`?"
+            raise SettingsError(f"there is no setting `{name}`\n  help: {hint}", help=hint)
 
 
 def names_of(flag: str) -> str:

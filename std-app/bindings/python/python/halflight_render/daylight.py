@@ -114,13 +114,14 @@ def _traced(radiance: Any, described: bytes, directions: NDArray[np.float64]) ->
 
 
 def scene(
-    files: Iterable[str | os.PathLike[str]], *, sky: Sky | None = None, memory: int | None = None
+    files: Iterable[str | os.PathLike[str]] | str | os.PathLike[str], *, sky: Sky | None = None, memory: int | None = None
 ) -> Scene:
     """The scene of Radiance files, whose commands are run, below `sky`.
 
     Polygons, spheres, cylinders, cones and rings of the materials plastic, metal, mirror, glass, dielectric, light,
     glow and illum are accepted; patterns, textures and mixtures are refused.
     """
+    files = [files] if isinstance(files, str | os.PathLike) else files
     return _built([p for file in files for p in _primitives(Path(file))], sky, memory)
 
 
