@@ -2,6 +2,7 @@
 
 use super::buffers::Geometry;
 use super::instances::{self, Palette, Shared};
+use super::map::Map;
 use super::memory_estimate::of_scene;
 use super::mtl::MtlMaterial;
 use super::notes::Notes;
@@ -32,7 +33,8 @@ impl SceneBuilder {
         let mut textures = self.textures(options, environment.as_ref())?;
         let notes = &mut self.notes;
         let of_maps = |mtl: &mut MtlMaterial| {
-            let maps = mtl.maps.values_mut().filter(|map| map.found.is_some() && !options.keeps_texcoords);
+            let is_placed = |map: &&mut Map| map.found.is_some() && !map.options.second_set;
+            let maps = mtl.maps.values_mut().filter(|map| is_placed(map) && !options.keeps_texcoords);
             Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
         };
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
@@ -78,6 +80,8 @@ impl SceneBuilder {
             positions: geometry.positions,
             normals: geometry.normals,
             texcoords: geometry.texcoords,
+            second_texcoords: geometry.second_texcoords,
+            colors: geometry.colors,
             triangles: geometry.triangles,
             overlaps: overlaps::both_orders(&overlaps),
             materials,

@@ -7,7 +7,7 @@ use halflight_core::scene::{NormalMap, ScalarInput, Surface, TextureId, Wrap};
 use serde_json::{Value, json};
 
 /// A square whose texture 0 is this PNG.
-fn textured(png: &[u8], material: Value) -> Gltf {
+pub(super) fn textured(png: &[u8], material: Value) -> Gltf {
     let mut file = Gltf::square(material);
     let view = file.view(png);
     file.json["images"] = json!([{ "bufferView": view, "mimeType": "image/png" }]);
