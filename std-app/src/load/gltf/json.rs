@@ -37,7 +37,7 @@ objects! {
     }
     /// The version alone: objects of glTF 1.0 are others.
     Versioned { asset: Asset, }
-    Asset { version: String, min_version: Option<String>, }
+    Asset { version: String, min_version: Option<String>, generator: String, }
     OfDocument { #[serde(rename = "KHR_lights_punctual")] lights: Lights, }
     Lights { lights: Vec<Light>, }
     Scene { nodes: Vec<usize>, }

@@ -61,7 +61,8 @@ fn textures_rotated_in_two_ways_are_both_right() {
     let scene = file.loaded();
     assert!(scene.repairs.is_empty(), "{:?}", scene.repairs);
     // The corner (0, 1) of the file is blue; the rotation moves it to (1, 0), which is green.
-    let corner = |sets: &[[f32; 2]], number: usize| scene.textures.views()[number].lookup(Vec2::from(sets[0]));
+    let corner =
+        |sets: &[[f32; 2]], number: usize| scene.textures.views()[number].lookup(Vec2::from(sets[0]));
     assert_eq!(corner(&scene.texcoords, 0), [0.0, 1.0, 0.0, 1.0]);
     assert_eq!(corner(&scene.second_texcoords, 1), [0.0, 0.0, 1.0, 1.0]);
 }
