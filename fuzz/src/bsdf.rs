@@ -27,8 +27,9 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let second_set = input.arbitrary()?;
     let wrap = if input.arbitrary()? { Wrap::REPEAT } else { Wrap::CLAMP };
     // A texture with fewer texels than its size promises is the caller's mistake, and must not crash.
-    let textures = [Texels::Float(&floats), Texels::Srgb8(&bytes), Texels::Linear8(&bytes)]
-        .map(|texels| Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY, second_set });
+    let textures = [Texels::Float(&floats), Texels::Srgb8(&bytes), Texels::Linear8(&bytes)].map(|texels| {
+        Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY, second_set }
+    });
     let mesh = Mesh::default();
     let camera = Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0);
     let scene = Scene { mesh, materials: &[], textures: &textures, lights: &[], environment: None, camera };

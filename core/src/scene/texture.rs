@@ -265,14 +265,8 @@ mod tests {
     const RGBW: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
 
     fn texture(wrap: Wrap) -> Texture<'static> {
-        Texture {
-            width: 2,
-            height: 2,
-            texels: Texels::Float(&RGBW),
-            wrap,
-            transform: IDENTITY,
-            second_set: false,
-        }
+        let (width, height, transform) = (2, 2, IDENTITY);
+        Texture { width, height, texels: Texels::Float(&RGBW), wrap, transform, second_set: false }
     }
 
     #[test]
@@ -355,14 +349,8 @@ mod tests {
         for wrap in [Wrap::REPEAT, Wrap::CLAMP] {
             // The last one lacks texels.
             for (width, height) in [(5, 3), (3, 5), (1, 15), (15, 1), (8, 8)] {
-                let t = Texture {
-                    width,
-                    height,
-                    texels: Texels::Srgb8(&texels),
-                    wrap,
-                    transform,
-                    second_set: false,
-                };
+                let texels = Texels::Srgb8(&texels);
+                let t = Texture { width, height, texels, transform, ..texture(wrap) };
                 let (mut block, mut mixture) = (TextureBlock::EMPTY, [[0.0; 16]; 3]);
                 let uv: [Vec2; 16] = core::array::from_fn(|i| match i {
                     0 => Vec2::new(f32::NAN, 1e30),

@@ -70,8 +70,8 @@ fn is_flat(geometry: &Geometry, material: u32) -> bool {
     })
 }
 
-/// Number of open edges of each glass, roots of the pieces that have them or are flat in spite of two faces at
-/// each edge, and number of all its pieces.
+/// Number of open edges of each glass, roots of the pieces that have them or are flat with two faces at each
+/// edge, and number of all its pieces.
 fn open(geometry: &Geometry, materials: &[Material]) -> BTreeMap<u32, (u64, BTreeSet<u32>, usize)> {
     let is_glass = |t: u32| matches!(materials[t as usize].surface, Surface::Dielectric { .. });
     if !(0..materials.len() as u32).any(is_glass) {

@@ -230,7 +230,8 @@ impl HalflightMaterial {
             HALFLIGHT_PANE => Surface::Pane { ior: ior.max(1.0), tint },
             _ => return Err(HalflightStatus::Material),
         };
-        let emission = ColorInput { texture: texture_id(self.emission_texture), ..Vec3::from(self.emission).into() };
+        let emission =
+            ColorInput { texture: texture_id(self.emission_texture), ..Vec3::from(self.emission).into() };
         let opacity = ScalarInput::from(1.0 - self.transparency);
         Ok(Material { surface, emission, two_sided: self.emits_on_both_sides, opacity, normal_map: None })
     }

@@ -134,10 +134,12 @@ fn colours_without_alpha_and_of_unlit_materials() {
     let scene = colored("VEC3", 5126, &floats, json!({})).loaded();
     assert!(says(&scene, &["vertex colours are limited"]));
     assert_eq!(scene.colors, [[0.25, 0.5, 1.0, 1.0]; 4]);
+    let Surface::Conductor { reflectance, .. } = scene.materials[0].surface else { panic!() };
     assert!(
-        matches!(scene.materials[0].surface, Surface::Conductor { reflectance, .. } if reflectance.vertex_color)
+        reflectance.vertex_color
+            && !scene.materials[0].has_cutout()
+            && !scene.materials[0].emission.vertex_color
     );
-    assert!(!scene.materials[0].has_cutout() && !scene.materials[0].emission.vertex_color);
     let unlit = json!({ "extensions": { "KHR_materials_unlit": {} } });
     let scene = colored("VEC3", 5126, &floats, unlit).loaded();
     assert!(scene.materials[0].emission.vertex_color);
