@@ -1,7 +1,7 @@
 //! Vertex attributes of which material inputs are functions, interpolated to a point of a surface.
 
 use super::Scene;
-use super::mesh::Mesh;
+use super::mesh::{Instances, Mesh};
 use crate::Rgb;
 use glam::{Vec2, Vec4, Vec4Swizzles};
 
@@ -30,9 +30,12 @@ impl Mesh<'_> {
     /// True if vertices have colours, or a second set of texture coordinates.
     #[inline]
     pub(crate) fn has_more_attributes(&self) -> bool {
-        let of_instances = &self.instances;
-        !(self.second_texcoords.is_empty() && self.colors.is_empty())
-            || !(of_instances.second_texcoords.is_empty() && of_instances.colors.is_empty())
+        let Instances { second_texcoords, colors, .. } = &self.instances;
+        let has_none = self.second_texcoords.is_empty()
+            && self.colors.is_empty()
+            && second_texcoords.is_empty()
+            && colors.is_empty();
+        !has_none
     }
 
     /// Attributes at barycentric coordinates of triangle `index`.
