@@ -16,9 +16,9 @@ const EFFICACY: f64 = 683.0;
 /// Width of the ramp that comes closest to the soft edge of a Blender lamp, in widths of that edge.
 const RAMP: f64 = 0.8;
 
-/// Cone with the falloff of a Blender lamp. Its exporter writes the blend b of a lamp as 1 - inner / outer. Its
-/// light falls from cos outer + b (1 - cos outer) to cos outer by a cubic; ours is linear in the angle, of the
-/// same power.
+/// Cone with the falloff of a Blender lamp. Its exporter writes the blend b of a lamp as 1 - inner / outer.
+/// Its light falls from cos outer + b (1 - cos outer) to cos outer by a cubic; ours is linear in the angle,
+/// of the same power.
 fn of_blender([inner, outer]: [f64; 2]) -> [f64; 2] {
     let height = 1.0 - outer.cos();
     let edge = (1.0 - inner / outer) * height;

@@ -208,3 +208,24 @@ fn prototypes_keep_sets_and_colours() {
         assert_ne!(a.uv[0], a.uv[1]);
     }
 }
+
+#[test]
+fn damaged_attributes_are_refused_or_limited() {
+    let refuse = |kind: &str, count: usize, words: &str| {
+        let mut file = colored("VEC3", 5126, &[0; 48], json!({}));
+        let color = &mut file.json["accessors"][4];
+        (color["type"], color["count"]) = (json!(kind), json!(count));
+        let error = file.load().unwrap_err().to_string();
+        assert!(error.contains(words), "{words}: {error}");
+    };
+    refuse("VEC2", 4, "`VEC2`, and 4 numbers");
+    refuse("VEC3", 3, "3 elements for 4 positions");
+    refuse("VEC3", 1 << 40, "claims");
+    refuse("VEC3", 5, "reach beyond");
+    let mut file = two_sets(json!({ "index": 0, "texCoord": 1 }));
+    file.json["accessors"][2]["count"] = json!(3);
+    assert!(file.load().unwrap_err().to_string().contains("3 elements for 4 positions"));
+    let nan: Vec<u8> =
+        [f32::NAN, f32::INFINITY, -1.0].repeat(4).iter().flat_map(|x| x.to_le_bytes()).collect();
+    assert_eq!(colored("VEC3", 5126, &nan, json!({})).loaded().colors, [[1.0, 1.0, 0.0, 1.0]; 4]);
+}
