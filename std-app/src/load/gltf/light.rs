@@ -23,7 +23,7 @@ fn of_blender([inner, outer]: [f64; 2]) -> [f64; 2] {
     let height = 1.0 - outer.cos();
     let edge = (1.0 - inner / outer) * height;
     let width = RAMP * edge / (outer.cos() + 0.5 * edge).acos().sin();
-    if !(width > 1e-6) {
+    if width.is_nan() || width <= 1e-6 {
         return [inner, outer];
     }
     // The power of a ramp from a to b, over 2π, is 1 - (sin b - sin a) / (b - a); it grows with the middle.
