@@ -8,7 +8,7 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf};
 use halflight_core::sampling::warp::uniform_sphere;
 use halflight_core::scene::{
-    Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Texels, Texture, TextureId,
+    Attributes, Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Texels, Texture, TextureId,
     TextureTransform, Wrap,
 };
 
@@ -24,16 +24,20 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let [width, height]: [u32; 2] = [input.int_in_range(0..=3)?, input.int_in_range(0..=3)?];
     let floats = (0..input.int_in_range(0..=9)?).map(|_| point(input)).collect::<Result<Vec<_>>>()?;
     let bytes = input.arbitrary::<[[u8; 4]; 4]>()?;
+    let second_set = input.arbitrary()?;
     let wrap = if input.arbitrary()? { Wrap::REPEAT } else { Wrap::CLAMP };
     // A texture with fewer texels than its size promises is the caller's mistake, and must not crash.
-    let textures = [Texels::Float(&floats), Texels::Srgb8(&bytes), Texels::Linear8(&bytes)]
-        .map(|texels| Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY });
+    let textures = [Texels::Float(&floats), Texels::Srgb8(&bytes), Texels::Linear8(&bytes)].map(|texels| {
+        Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY, second_set }
+    });
     let mesh = Mesh::default();
     let camera = Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0);
     let scene = Scene { mesh, materials: &[], textures: &textures, lights: &[], environment: None, camera };
     let material = Material { surface: surface(input)?, ..Material::GREY };
-    let uv = Vec2::new(coordinate(input)?, coordinate(input)?);
-    let bsdf = Bsdf::at::<All>(&scene, &material, uv, input.arbitrary()?);
+    let mut uv = || Ok::<_, arbitrary::Error>(Vec2::new(coordinate(input)?, coordinate(input)?));
+    let uv = [uv()?, uv()?];
+    let attributes = Attributes { uv, color: point(input)?.into(), alpha: fraction(input)? };
+    let bsdf = Bsdf::at::<All>(&scene, &material, &attributes, input.arbitrary()?);
 
     let mut wo = uniform_sphere([fraction(input)?, fraction(input)?]);
     // Normal incidence and grazing directions are the limits of the formulas.
@@ -100,14 +104,14 @@ fn surface(input: &mut Unstructured) -> Result<Surface> {
 fn color(input: &mut Unstructured) -> Result<ColorInput> {
     let value = Rgb::new(scalar(input)?.value, fraction(input)?, fraction(input)?);
     let texture = texture(input)?;
-    Ok(ColorInput { value, texture })
+    Ok(ColorInput { value, texture, vertex_color: input.arbitrary()? })
 }
 
 /// Mostly within 0 … 1.
 fn scalar(input: &mut Unstructured) -> Result<ScalarInput> {
     let value = if input.ratio(7, 8)? { fraction(input)? } else { coordinate(input)? };
     let texture = texture(input)?.map(|id| (id, (id.0 * 3 % 5) as u8));
-    Ok(ScalarInput { value, texture })
+    Ok(ScalarInput { value, texture, vertex_alpha: input.arbitrary()? })
 }
 
 fn texture(input: &mut Unstructured) -> Result<Option<TextureId>> {

@@ -9,7 +9,7 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, DiffuseOnly, Features};
 use halflight_core::sampling::Random;
 use halflight_core::scene::Camera;
-use halflight_core::scene::{Material, Mesh, Scene, Surface};
+use halflight_core::scene::{Attributes, Material, Mesh, Scene, Surface};
 use std::time::Instant;
 
 const CALLS: usize = 4096;
@@ -69,7 +69,7 @@ fn time<F: Features>(name: &str, surface: Surface) {
             (direction(1.0 - 0.99 * u(0), u(1)), direction(1.0 - 0.99 * u(2), u(3)), [u(4), u(5), u(6)])
         })
         .collect();
-    let at = || Bsdf::at::<F>(&scene, black_box(&material), Vec2::ZERO, true);
+    let at = || Bsdf::at::<F>(&scene, black_box(&material), &Attributes::NONE, true);
     let bsdf = black_box(at());
     let nanoseconds = |f: &dyn Fn(&Input) -> f32| {
         let mut best = f64::INFINITY;

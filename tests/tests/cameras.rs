@@ -70,6 +70,7 @@ fn a_panorama_of_an_environment_is_its_map() {
         texels: Texels::Float(&texels),
         wrap: Wrap::REPEAT,
         transform: TextureTransform::IDENTITY,
+        second_set: false,
     };
     // The middle of a map is −x.
     let camera = Camera::look_at(Vec3::new(3.0, 1.0, 2.0), Vec3::new(2.0, 1.0, 2.0), Vec3::Y, 40.0);

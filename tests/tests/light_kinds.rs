@@ -7,7 +7,7 @@ use halflight_core::Rgb;
 use halflight_core::light::{LightSampler, emitted};
 use halflight_core::memory::Arena;
 use halflight_core::sampling::{Random, Sampler, warp};
-use halflight_core::scene::{DistantDisc, Environment, PointLight, Scene};
+use halflight_core::scene::{Attributes, DistantDisc, Environment, PointLight, Scene};
 use halflight_core::scene::{Texels, Texture, TextureId, TextureTransform, Wrap};
 use halflight_tests::memory::TestArena;
 
@@ -29,6 +29,7 @@ fn sky() -> Stage {
         texels: Texels::Float(&SKY),
         wrap: Wrap::REPEAT,
         transform: TextureTransform::IDENTITY,
+        second_set: false,
     };
     let to_map = Mat3::from_cols(Vec3::new(0.0, 0.0, 1.0), Vec3::X, Vec3::Y);
     Stage {
@@ -275,9 +276,9 @@ fn lamps_shine_to_their_front_only_unless_two_sided() {
             assert_eq!(seen(Vec3::NEG_Z).is_some(), two_sided);
             let back = lights.pdf_hit(scene, Vec3::NEG_Z, Vec3::ZERO, 0, 1.0, Vec3::Z);
             assert_eq!(back > 0.0, two_sided);
-            assert_eq!(emitted(scene, 0, Vec2::ZERO, false) == Rgb::ZERO, !two_sided);
-            assert_eq!(emitted(scene, 1, Vec2::ZERO, true), Rgb::ONE);
-            assert_eq!(emitted(scene, 7, Vec2::ZERO, true), Rgb::ZERO);
+            assert_eq!(emitted(scene, 0, &Attributes::NONE, false) == Rgb::ZERO, !two_sided);
+            assert_eq!(emitted(scene, 1, &Attributes::NONE, true), Rgb::ONE);
+            assert_eq!(emitted(scene, 7, &Attributes::NONE, true), Rgb::ZERO);
         });
     }
 }
@@ -292,6 +293,7 @@ fn a_textured_lamp_sends_what_its_texels_say() {
         texels: Texels::Float(&CHECKER),
         wrap: Wrap::CLAMP,
         transform: TextureTransform::IDENTITY,
+        second_set: false,
     }];
     stage.materials[0].emission.texture = Some(TextureId(0));
     stage.texcoords = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];

@@ -307,12 +307,16 @@ fn flat_sheets_of_glass_are_panes() {
         found.unwrap()
     };
     let is_pane = |scene: &LoadedScene| matches!(scene.materials[0].surface, Surface::Pane { .. });
-    for faces in ["f 1 2 3 4\n", "f 1 2 3 4\nf 5 6 7\n", "f 1 2 3\nf 3 2 1\n"] {
+    // The last has two faces whose diagonals cross, so that each edge has two faces.
+    let crossed = "f 1 2 3\nf 1 3 4\nf 2 1 4\nf 2 4 3\n";
+    for faces in ["f 1 2 3 4\n", "f 1 2 3 4\nf 5 6 7\n", "f 1 2 3\nf 3 2 1\n", crossed] {
         let sheets = of(faces, "Ni 1.5\nTf 0.5 0.6 0.7\n");
         says(&sheets, &["glass `a` is flat sheets", "thin panes"]);
         let Surface::Pane { ior, tint } = sheets.materials[0].surface else { panic!("{faces}") };
         assert_eq!((ior, tint), (1.5, Rgb::new(0.5, 0.6, 0.7)));
     }
+    // One that is water stays solid, and is told.
+    says(&of(crossed, "Ni 1.33\n"), &["1 flat pieces of two faces", "`kind = \"pane\"`"]);
     // Water, frosted glass, a bent sheet.
     for (faces, mtl) in
         [("f 1 2 3 4\n", "Ni 1.33\n"), ("f 1 2 3 4\n", "Ni 1.5\nPr 0.3\n"), ("f 5 6 8 7\n", "Ni 1.5\n")]

@@ -27,18 +27,14 @@ const MATERIALS: [Material; 4] = [
     Material::diffuse(Rgb::splat(0.7)),
     Material::diffuse(Rgb::new(0.7, 0.1, 0.1)),
     Material::diffuse(Rgb::new(0.1, 0.6, 0.1)),
-    Material {
-        emission: ColorInput { value: Rgb::splat(20.0), texture: None },
-        ..Material::diffuse(Rgb::splat(0.7))
-    },
+    Material { emission: ColorInput::constant(Rgb::splat(20.0)), ..Material::diffuse(Rgb::splat(0.7)) },
 ];
 
 /// The materials with rough metal in place of red.
 const WITH_METAL: [Material; 4] = {
     let mut materials = MATERIALS;
-    let reflectance = ColorInput { value: Rgb::splat(0.9), texture: None };
-    materials[1].surface =
-        Surface::Conductor { reflectance, roughness: ScalarInput { value: 0.85, texture: None } };
+    let reflectance = ColorInput::constant(Rgb::splat(0.9));
+    materials[1].surface = Surface::Conductor { reflectance, roughness: ScalarInput::constant(0.85) };
     materials
 };
 

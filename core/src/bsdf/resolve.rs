@@ -3,14 +3,13 @@
 use super::range::{MAX_INDEX, unit, unit_rgb};
 use super::{Bsdf, Conductor, Dielectric, Diffuse, Features, Glossy, Mirror, Pane, Plastic, RoughDielectric};
 use crate::Rgb;
-use crate::scene::{ColorInput, Material, SMOOTH_ALPHA, ScalarInput, Scene, Surface};
-use glam::Vec2;
+use crate::scene::{Attributes, ColorInput, Material, SMOOTH_ALPHA, ScalarInput, Scene, Surface};
 
 impl Bsdf {
-    /// BSDF of `material` at texture coordinates `uv`, seen from its front or its back.
+    /// BSDF of `material` at a point with these attributes, seen from its front or its back.
     #[inline]
-    pub fn at<F: Features>(scene: &Scene, material: &Material, uv: Vec2, front: bool) -> Bsdf {
-        Self::of_texel::<F>((scene, material), None, uv, front)
+    pub fn at<F: Features>(scene: &Scene, material: &Material, attributes: &Attributes, front: bool) -> Bsdf {
+        Self::of_texel::<F>((scene, material), None, attributes, front)
     }
 
     /// [`Bsdf::at`] with the texel of [`Surface::color`], if it has been looked up.
@@ -18,14 +17,14 @@ impl Bsdf {
     pub(crate) fn of_texel<F: Features>(
         (scene, material): (&Scene, &Material),
         texel: Option<Rgb>,
-        uv: Vec2,
+        attributes: &Attributes,
         front: bool,
     ) -> Bsdf {
         let color = |input: &ColorInput| match texel {
-            Some(texel) => unit_rgb(input.value * texel),
-            None => unit_rgb(input.at::<F>(scene, uv)),
+            Some(texel) => unit_rgb(input.of_texel(texel, attributes)),
+            None => unit_rgb(input.at::<F>(scene, attributes)),
         };
-        let alpha = |input: &ScalarInput| alpha(input.at::<F>(scene, uv));
+        let alpha = |input: &ScalarInput| alpha(input.at::<F>(scene, attributes));
         match &material.surface {
             Surface::Diffuse { reflectance } => Bsdf::Diffuse(Diffuse { reflectance: color(reflectance) }),
             Surface::Mirror { reflectance } if F::GLOSSY => {
@@ -36,8 +35,8 @@ impl Bsdf {
                 Bsdf::Conductor(Conductor { f0: color(reflectance), alpha: alpha(roughness) })
             }
             Surface::Glossy { base, specular, roughness, metallic, ior } if F::GLOSSY => {
-                let (base, specular) = (color(base), unit_rgb(specular.at::<F>(scene, uv)));
-                let (alpha, metallic) = (alpha(roughness), unit(metallic.at::<F>(scene, uv)));
+                let (base, specular) = (color(base), unit_rgb(specular.at::<F>(scene, attributes)));
+                let (alpha, metallic) = (alpha(roughness), unit(metallic.at::<F>(scene, attributes)));
                 match *ior {
                     Some(ior) => Bsdf::Plastic(Plastic::new(base, specular, alpha, metallic, ior)),
                     None if specular == Rgb::ZERO && metallic == 0.0 => {

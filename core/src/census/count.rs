@@ -50,7 +50,7 @@ pub struct Census {
     pub materials: u64,
     /// Triangles by kind of surface.
     pub surfaces: SurfaceKinds,
-    /// Triangles whose material uses a texture.
+    /// Triangles whose material uses a texture or vertex colours.
     pub textured: u64,
     /// Triangles with a normal or bump map.
     pub normal_mapped: u64,
@@ -178,8 +178,8 @@ impl Census {
 const FLAT: f32 = 1e-5;
 
 fn has_texture(material: &Material) -> bool {
-    let color = |input: &ColorInput| input.texture.is_some();
-    let scalar = |input: &ScalarInput| input.texture.is_some();
+    let color = |input: &ColorInput| input.varies();
+    let scalar = |input: &ScalarInput| input.varies();
     let surface = match &material.surface {
         Surface::Diffuse { reflectance } | Surface::Mirror { reflectance } => color(reflectance),
         Surface::Conductor { reflectance, roughness } => color(reflectance) || scalar(roughness),

@@ -128,7 +128,7 @@ fn emitters(scene: &Scene) -> impl Iterator<Item = Emitter> {
             };
             let same =
                 scene.mesh.triangles.get(next as usize).is_some_and(|t| t.material == triangle.material);
-            let textured = material.emission.texture.is_some() || material.has_cutout();
+            let textured = material.emission.varies() || material.has_cutout();
             if let Some(emitter) = Emitter::new(&scene.mesh, index, same, material.two_sided, textured) {
                 next += u32::from(emitter.is_pair());
                 return Some(emitter);

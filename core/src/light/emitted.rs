@@ -5,19 +5,18 @@ use super::luminance;
 use crate::Rgb;
 use crate::features::All;
 use crate::sampling::{Sampler, warp::uniform_triangle};
-use crate::scene::{Material, PointLight, Scene};
-use glam::Vec2;
+use crate::scene::{Attributes, Material, PointLight, Scene};
 
 /// Points for the mean of a textured emission.
 const TEXTURE_SAMPLES: u32 = 16;
 
-/// Radiance that `triangle` emits at texture coordinates `uv`, to its front or its back.
+/// Radiance that `triangle` emits at a point with these attributes, to its front or its back.
 #[inline]
-pub fn emitted(scene: &Scene, triangle: u32, uv: Vec2, front: bool) -> Rgb {
+pub fn emitted(scene: &Scene, triangle: u32, attributes: &Attributes, front: bool) -> Rgb {
     match scene.mesh.material(triangle).and_then(|material| scene.materials.get(material as usize)) {
         Some(material) if front || material.two_sided => {
             // Textures may hold negative numbers; radiance may not.
-            material.emission.at::<All>(scene, uv).max(Rgb::ZERO)
+            material.emission.at::<All>(scene, attributes).max(Rgb::ZERO)
         }
         _ => Rgb::ZERO,
     }
@@ -27,13 +26,11 @@ pub fn emitted(scene: &Scene, triangle: u32, uv: Vec2, front: bool) -> Rgb {
 #[inline]
 pub(super) fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> Rgb {
     if !emitter.is_textured() {
-        return emitted(scene, place.triangle, Vec2::ZERO, front);
+        return emitted(scene, place.triangle, &Attributes::NONE, front);
     }
-    let [a, b, c] = scene.mesh.corner_texcoords(place.triangle);
-    let [u, v] = place.barycentric;
-    let uv = (1.0 - u - v) * a + u * b + v * c;
-    let opacity = material_of(scene, place.triangle).map_or(1.0, |m| m.opacity.at::<All>(scene, uv));
-    emitted(scene, place.triangle, uv, front) * opacity.clamp(0.0, 1.0)
+    let attributes = &scene.mesh.attributes_at(place.triangle, place.barycentric);
+    let opacity = material_of(scene, place.triangle).map_or(1.0, |m| m.opacity.at::<All>(scene, attributes));
+    emitted(scene, place.triangle, attributes, front) * opacity.clamp(0.0, 1.0)
 }
 
 /// Mean luminance of a light, positive if its material emits at all.

@@ -27,7 +27,7 @@ pub(super) fn furnace() -> [Material; 4] {
 }
 
 fn emitting(reflectance: f32, emission: Rgb) -> Material {
-    let emission = ColorInput { value: emission, texture: None };
+    let emission = ColorInput::constant(emission);
     Material { emission, two_sided: true, ..Material::diffuse(Rgb::splat(reflectance)) }
 }
 

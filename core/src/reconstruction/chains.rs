@@ -227,12 +227,10 @@ impl<'a, F: Features> Chains<'a, F> {
     /// True if normal and albedo are the same all over a triangle of `material`.
     fn is_uniform(&self, material: &Material) -> bool {
         let is_textured = match &material.surface {
-            Surface::Diffuse { reflectance } => reflectance.texture.is_some(),
-            Surface::Conductor { reflectance, roughness } => {
-                reflectance.texture.is_some() || roughness.texture.is_some()
-            }
+            Surface::Diffuse { reflectance } => reflectance.varies(),
+            Surface::Conductor { reflectance, roughness } => reflectance.varies() || roughness.varies(),
             Surface::Glossy { base, specular, metallic, .. } => {
-                base.texture.is_some() || specular.texture.is_some() || metallic.texture.is_some()
+                base.varies() || specular.varies() || metallic.varies()
             }
             Surface::Dielectric { .. } | Surface::Mirror { .. } | Surface::Pane { .. } => false,
         };

@@ -66,6 +66,8 @@ mod tests {
             positions: &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             normals: &[],
             texcoords: &[],
+            second_texcoords: &[],
+            colors: &[],
             triangles: &[Triangle { vertices: [0, 1, 2], material: 0 }],
             overlaps: &[],
             instances: Instances::NONE,
@@ -90,7 +92,7 @@ mod tests {
     fn emissive(value: Rgb, texture: Option<TextureId>) -> Material {
         Material {
             surface: Surface::Diffuse { reflectance: Rgb::ONE.into() },
-            emission: ColorInput { value, texture },
+            emission: ColorInput { texture, ..value.into() },
             two_sided: false,
             opacity: 1.0.into(),
             normal_map: None,
@@ -100,7 +102,14 @@ mod tests {
     fn texture(texels: &[[f32; 3]]) -> Texture<'_> {
         let (width, height) = (texels.len() as u32, 1);
         let transform = TextureTransform::IDENTITY;
-        Texture { width, height, texels: Texels::Float(texels), wrap: Wrap::REPEAT, transform }
+        Texture {
+            width,
+            height,
+            texels: Texels::Float(texels),
+            wrap: Wrap::REPEAT,
+            transform,
+            second_set: false,
+        }
     }
 
     #[test]

@@ -101,20 +101,18 @@ impl Material {
 
     /// Diffuse surface.
     pub const fn diffuse(reflectance: Rgb) -> Self {
-        let none = ColorInput { value: Rgb::ZERO, texture: None };
         Self {
-            surface: Surface::Diffuse { reflectance: ColorInput { value: reflectance, texture: None } },
-            emission: none,
+            surface: Surface::Diffuse { reflectance: ColorInput::constant(reflectance) },
+            emission: ColorInput::constant(Rgb::ZERO),
             two_sided: false,
-            opacity: ScalarInput { value: 1.0, texture: None },
+            opacity: ScalarInput::constant(1.0),
             normal_map: None,
         }
     }
 
     /// Black surface that emits `radiance` from its front, where its corners go counter-clockwise.
     pub const fn lamp(radiance: Rgb) -> Self {
-        let emission = ColorInput { value: radiance, texture: None };
-        Self { emission, ..Self::diffuse(Rgb::ZERO) }
+        Self { emission: ColorInput::constant(radiance), ..Self::diffuse(Rgb::ZERO) }
     }
 
     /// True if the material emits light.
@@ -132,8 +130,6 @@ impl Material {
     /// True if a ray may pass straight through, by opacity or because it is a pane.
     #[inline]
     pub fn has_cutout(&self) -> bool {
-        self.opacity.value < 1.0
-            || self.opacity.texture.is_some()
-            || matches!(self.surface, Surface::Pane { .. })
+        self.opacity.value < 1.0 || self.opacity.varies() || matches!(self.surface, Surface::Pane { .. })
     }
 }

@@ -25,6 +25,10 @@ pub struct Mesh<'a> {
     pub normals: &'a [[f32; 3]],
     /// Texture coordinates, one for each position, or empty. v points up.
     pub texcoords: &'a [[f32; 2]],
+    /// Texture coordinates of a second set, as `texcoords`; nearly always empty.
+    pub second_texcoords: &'a [[f32; 2]],
+    /// Linear RGBA of the vertices, one for each position, or empty.
+    pub colors: &'a [[f32; 4]],
     /// Triangles.
     pub triangles: &'a [Triangle],
     /// Pairs of triangles that overlap in one plane, in both orders, ascending; or empty.
@@ -42,6 +46,10 @@ pub struct Instances<'a> {
     pub normals: &'a [[f32; 3]],
     /// Texture coordinates, one for each position, or empty.
     pub texcoords: &'a [[f32; 2]],
+    /// Texture coordinates of a second set, as `texcoords`.
+    pub second_texcoords: &'a [[f32; 2]],
+    /// Linear RGBA of the vertices, one for each position, or empty.
+    pub colors: &'a [[f32; 4]],
     /// Triangles of all prototypes. None emits.
     pub triangles: &'a [Triangle],
     /// Overlaps of all prototypes.
@@ -54,12 +62,14 @@ pub struct Instances<'a> {
 
 impl<'a> Mesh<'a> {
     /// Checks the indices. The error is the index of the first triangle with a vertex or material that does
-    /// not exist, or 0 if `normals` or `texcoords` are neither empty nor as long as `positions`, or if the
+    /// not exist, or 0 if an array of vertices is neither empty nor as long as `positions`, or if the
     /// instances are broken.
     pub fn validate(&self, materials: usize) -> Result<(), usize> {
         let vertices = self.positions.len();
         let fits = |length: usize| length == 0 || length == vertices;
-        if !fits(self.normals.len()) || !fits(self.texcoords.len()) {
+        let lengths =
+            [self.normals.len(), self.texcoords.len(), self.second_texcoords.len(), self.colors.len()];
+        if !lengths.into_iter().all(fits) {
             return Err(0);
         }
         let broken = |t: &Triangle| {
@@ -140,6 +150,8 @@ impl<'a> Instances<'a> {
         positions: &[],
         normals: &[],
         texcoords: &[],
+        second_texcoords: &[],
+        colors: &[],
         triangles: &[],
         overlaps: &[],
         prototypes: &[],
@@ -154,6 +166,8 @@ impl<'a> Instances<'a> {
             positions: part(self.positions, ranges.vertices),
             normals: part(self.normals, ranges.vertices),
             texcoords: part(self.texcoords, ranges.vertices),
+            second_texcoords: part(self.second_texcoords, ranges.vertices),
+            colors: part(self.colors, ranges.vertices),
             triangles: part(self.triangles, ranges.triangles),
             overlaps: part(self.overlaps, ranges.overlaps),
             instances: Instances::NONE,

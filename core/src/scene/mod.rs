@@ -1,6 +1,7 @@
 //! Scene description: borrowed views of mesh, materials, textures, lights and camera. A scene owns no memory;
 //! the application's buffers or a microcontroller's flash hold the data.
 
+mod attributes;
 mod camera;
 mod class;
 mod dark;
@@ -17,6 +18,7 @@ mod placed;
 mod surface;
 mod texture;
 
+pub use attributes::Attributes;
 pub use camera::{Camera, CameraKind, PixelWidth, Projection, StartPlane};
 pub(crate) use class::{CAUSTIC_ALPHA, SMOOTH_ALPHA};
 pub use input::{ColorInput, ScalarInput};

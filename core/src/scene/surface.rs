@@ -3,7 +3,7 @@
 //! (`halflight_simd::kernels::shade::surface`).
 
 use super::placed::PlacedTriangle;
-use super::{Material, NormalMap, Scene, Triangle};
+use super::{Attributes, Material, NormalMap, Scene, Triangle};
 use crate::features::Features;
 use crate::geometry::{Frame, Hit, Ray};
 use glam::{Vec2, Vec3};
@@ -21,8 +21,8 @@ pub struct SurfacePoint<'a> {
     /// Shading frame: interpolated normal, normal or bump map. Its z axis is never turned away from the
     /// viewer.
     pub frame: Frame,
-    /// Texture coordinates; zero in scenes without textures.
-    pub uv: Vec2,
+    /// Attributes of the vertices; none in scenes without textures and vertex colours.
+    pub attributes: Attributes,
     /// True if the viewer is on the side from which the triangle is counter-clockwise.
     pub front: bool,
     /// Material of the triangle.
@@ -72,16 +72,20 @@ impl<'a> SurfacePoint<'a> {
                 shading = -shading;
             }
         }
-        let mut uv = Vec2::ZERO;
+        let mut attributes = Attributes::NONE;
         let mut bent = false;
-        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
+        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && scene.has_attributes() {
             let t = texture_corners(texcoords, triangle.vertices);
-            uv = w * t[0] + u * t[1] + v * t[2];
+            attributes.uv[0] = w * t[0] + u * t[1] + v * t[2];
+            if mesh.has_more_attributes() {
+                mesh.add_attributes(hit.triangle, [u, v], &mut attributes);
+            }
             if F::NORMAL_MAPS
                 && let Some(map) = material.normal_map
             {
                 let sides = [t[1] - t[0], t[2] - t[0]];
-                shading = mapped_normal(scene, map, uv, shading, [e1, e2], sides).unwrap_or(shading);
+                let of_texture = (&attributes, sides, hit.triangle);
+                shading = mapped_normal(scene, map, of_texture, shading, [e1, e2]).unwrap_or(shading);
                 bent = true;
             }
         }
@@ -98,7 +102,16 @@ impl<'a> SurfacePoint<'a> {
             }
         }
         let frame = Frame::from_normal(shading);
-        Some(Self { position, error, geometric_normal, frame, uv, front, material, triangle: hit.triangle })
+        Some(Self {
+            position,
+            error,
+            geometric_normal,
+            frame,
+            attributes,
+            front,
+            material,
+            triangle: hit.triangle,
+        })
     }
 
     /// True if a direction, in the shading frame and in the world, is on the same side of the geometric and
@@ -204,28 +217,28 @@ fn interpolated_normal(normals: &[[f32; 3]], vertices: [u32; 3], weights: [f32; 
 }
 
 /// Perturbation of `normal` by a map. `edges` and `sides` are two edges of the triangle in space and in
-/// texture coordinates. `None` if the texture coordinates are degenerate.
+/// texture coordinates of the first set. `None` if the texture coordinates are degenerate.
 fn mapped_normal(
     scene: &Scene,
     map: NormalMap,
-    uv: Vec2,
+    (attributes, sides, triangle): (&Attributes, [Vec2; 2], u32),
     normal: Vec3,
     edges: [Vec3; 2],
-    sides: [Vec2; 2],
 ) -> Option<Vec3> {
     let (texture, local) = match map {
         NormalMap::Tangent(id, factor) => {
             let texture = scene.textures.get(id.0 as usize)?;
-            let [x, y, z, _] = texture.lookup(uv);
+            let [x, y, z, _] = texture.lookup(texture.uv(attributes));
             let local = 2.0 * Vec3::new(x, y, z) - Vec3::ONE;
             (texture, Vec3::new(factor * local.x, factor * local.y, local.z))
         }
         NormalMap::Height(id, factor) => {
             let texture = scene.textures.get(id.0 as usize)?;
-            let slope = texture.gradient(uv) * factor;
+            let slope = texture.gradient(texture.uv(attributes)) * factor;
             (texture, Vec3::new(-slope.x, -slope.y, 1.0))
         }
     };
+    let sides = if texture.second_set { scene.mesh.second_sides(triangle) } else { sides };
     // A mirrored texture mirrors the directions of its normals.
     let mirrored = Vec2::ONE.copysign(texture.transform.scale);
     let local = Vec3::new(mirrored.x * local.x, mirrored.y * local.y, local.z);

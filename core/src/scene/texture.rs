@@ -1,6 +1,7 @@
 //! Texture lookup from borrowed texels: bilinear, wrapped, decoded to linear. No input panics: coordinates
 //! that are not finite count as 0, and a texture without texels is white.
 
+use super::Attributes;
 use core::ops::RangeInclusive;
 use glam::{Vec2, Vec3, Vec4};
 use halflight_simd::kernels::shade::put;
@@ -78,9 +79,17 @@ pub struct Texture<'a> {
     pub wrap: Wrap,
     /// Map from the texture coordinates of a surface to those of the texture.
     pub transform: TextureTransform,
+    /// True if the second set of texture coordinates of a surface is meant.
+    pub second_set: bool,
 }
 
 impl Texture<'_> {
+    /// The texture coordinates of a surface that are meant.
+    #[inline]
+    pub(crate) fn uv(&self, attributes: &Attributes) -> Vec2 {
+        if self.second_set { attributes.uv[1] } else { attributes.uv[0] }
+    }
+
     /// Linear RGBA at texture coordinates `uv`: bilinear between texel centres, v up. Alpha is 1 if the
     /// texels have none.
     #[inline]
@@ -256,7 +265,8 @@ mod tests {
     const RGBW: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
 
     fn texture(wrap: Wrap) -> Texture<'static> {
-        Texture { width: 2, height: 2, texels: Texels::Float(&RGBW), wrap, transform: IDENTITY }
+        let (width, height, transform) = (2, 2, IDENTITY);
+        Texture { width, height, texels: Texels::Float(&RGBW), wrap, transform, second_set: false }
     }
 
     #[test]
@@ -339,7 +349,8 @@ mod tests {
         for wrap in [Wrap::REPEAT, Wrap::CLAMP] {
             // The last one lacks texels.
             for (width, height) in [(5, 3), (3, 5), (1, 15), (15, 1), (8, 8)] {
-                let t = Texture { width, height, texels: Texels::Srgb8(&texels), wrap, transform };
+                let texels = Texels::Srgb8(&texels);
+                let t = Texture { width, height, texels, transform, ..texture(wrap) };
                 let (mut block, mut mixture) = (TextureBlock::EMPTY, [[0.0; 16]; 3]);
                 let uv: [Vec2; 16] = core::array::from_fn(|i| match i {
                     0 => Vec2::new(f32::NAN, 1e30),

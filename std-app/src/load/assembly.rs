@@ -2,6 +2,7 @@
 
 use super::buffers::Geometry;
 use super::instances::{self, Palette, Shared};
+use super::map::Map;
 use super::memory_estimate::of_scene;
 use super::mtl::MtlMaterial;
 use super::notes::Notes;
@@ -31,11 +32,8 @@ impl SceneBuilder {
         }
         let mut textures = self.textures(options, environment.as_ref())?;
         let notes = &mut self.notes;
-        let of_maps = |mtl: &mut MtlMaterial| {
-            let maps = mtl.maps.values_mut().filter(|map| map.found.is_some() && !options.keeps_texcoords);
-            Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
-        };
-        let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
+        let texcoords = self.materials.iter_mut().map(|mtl| texcoords_of(mtl, options.keeps_texcoords));
+        let texcoords: Vec<Texcoords> = texcoords.collect();
         let resolved = |(number, mtl): (u32, &MtlMaterial)| match self.given.get(&number) {
             Some(material) => *material,
             None => surface::resolve(mtl, &mut textures, notes),
@@ -78,6 +76,8 @@ impl SceneBuilder {
             positions: geometry.positions,
             normals: geometry.normals,
             texcoords: geometry.texcoords,
+            second_texcoords: geometry.second_texcoords,
+            colors: geometry.colors,
             triangles: geometry.triangles,
             overlaps: overlaps::both_orders(&overlaps),
             materials,
@@ -99,6 +99,13 @@ impl SceneBuilder {
         };
         Ok(loaded.with_first_camera())
     }
+}
+
+/// The transform of the first texture coordinates of a material, of which its maps are relieved.
+fn texcoords_of(mtl: &mut MtlMaterial, keeps_texcoords: bool) -> Texcoords {
+    let is_placed = |map: &&mut Map| map.found.is_some() && !map.options.second_set;
+    let maps = mtl.maps.values_mut().filter(|map| is_placed(map) && !keeps_texcoords);
+    Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
 }
 
 /// True for materials whose flat sheets may be panes. Instances may be solid where other triangles of a

@@ -4,28 +4,36 @@
 use super::buffers::Geometry;
 use super::fit::Fit;
 use super::notes::Notes;
+use super::obj::Group;
 use super::placed::{Placed, is_usable};
 use super::split;
-use super::texcoords;
+use super::texcoords::{self, Texcoords};
 use glam::{DVec2, DVec3};
 use halflight_core::scene::Triangle;
 use rayon::prelude::*;
 
 /// Assembles all parts, in their order. `pieces` is the result of [`pieces`].
 pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Notes) -> Geometry {
-    let with_normals = parts.iter().any(|part| !part.group.normals.is_empty());
-    let with_texcoords = parts.iter().any(|part| !part.group.texcoords.is_empty());
+    let has = |has: fn(&Group) -> bool| parts.iter().any(|part| has(part.group));
+    let with = Attributes {
+        normals: has(|group| !group.normals.is_empty()),
+        texcoords: has(|group| !group.texcoords.is_empty()),
+        second_texcoords: has(|group| !group.second_texcoords.is_empty()),
+        colors: has(|group| !group.colors.is_empty()),
+    };
     let cut = pieces > 0.0 && split::is_affordable(pieces);
     if pieces > 0.0 && !cut {
         notes.add(1, "very many triangles are very large: none is cut, and their shading is coarse");
     }
-    let build = |part| Builder::new(part, fit, with_normals, with_texcoords).build(cut);
+    let build = |part| Builder::new(part, fit, &with).build(cut);
     let built: Vec<(Geometry, Notes)> = parts.par_iter().map(build).collect();
     let mut all = Geometry::default();
     let vertices = built.iter().map(|(part, _)| part.positions.len()).sum();
     all.positions.reserve_exact(vertices);
-    all.normals.reserve_exact(if with_normals { vertices } else { 0 });
-    all.texcoords.reserve_exact(if with_texcoords { vertices } else { 0 });
+    all.normals.reserve_exact(if with.normals { vertices } else { 0 });
+    all.texcoords.reserve_exact(if with.texcoords { vertices } else { 0 });
+    all.second_texcoords.reserve_exact(if with.second_texcoords { vertices } else { 0 });
+    all.colors.reserve_exact(if with.colors { vertices } else { 0 });
     all.triangles.reserve_exact(built.iter().map(|(part, _)| part.triangles.len()).sum());
     all.objects.reserve_exact(all.triangles.capacity());
     for (part, of_part) in built {
@@ -33,6 +41,8 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
         all.positions.extend(part.positions);
         all.normals.extend(part.normals);
         all.texcoords.extend(part.texcoords);
+        all.second_texcoords.extend(part.second_texcoords);
+        all.colors.extend(part.colors);
         let moved = |t: Triangle| Triangle { vertices: t.vertices.map(|v| v + first), ..t };
         all.triangles.extend(part.triangles.into_iter().map(moved));
         all.objects.extend(part.objects);
@@ -40,6 +50,14 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
         notes.merge(of_part);
     }
     all
+}
+
+/// Attributes that some part has, so that all vertices have them.
+struct Attributes {
+    normals: bool,
+    texcoords: bool,
+    second_texcoords: bool,
+    colors: bool,
 }
 
 /// Vertices of a part in the coordinates of the core; NaN if they are not finite.
@@ -82,21 +100,30 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn new(part: &'a Placed, fit: &Fit, with_normals: bool, with_texcoords: bool) -> Self {
+    fn new(part: &'a Placed, fit: &Fit, with: &Attributes) -> Self {
         let group = part.group;
         let mut notes = Notes::default();
         let exact = exact(part, fit);
         let mut geometry = Geometry { positions: exact.iter().map(rounded).collect(), ..Geometry::default() };
-        if with_normals {
+        if with.normals {
             let matrix = part.placement.normal_matrix();
             let normal = |n: &[f64; 3]| unit_normal(matrix * DVec3::from(*n), &mut notes);
             geometry.normals = group.normals.iter().map(normal).collect();
             geometry.normals.resize(exact.len(), [0.0; 3]);
         }
         let placed_texcoords = part.texcoords.placed(&group.texcoords, &mut notes);
-        if with_texcoords {
+        if with.texcoords {
             geometry.texcoords = placed_texcoords.iter().map(|uv| uv.map(|x| x as f32)).collect();
             geometry.texcoords.resize(exact.len(), [0.0; 2]);
+        }
+        if with.second_texcoords {
+            let placed = Texcoords::default().placed(&group.second_texcoords, &mut notes);
+            geometry.second_texcoords = placed.iter().map(|uv| uv.map(|x| x as f32)).collect();
+            geometry.second_texcoords.resize(exact.len(), [0.0; 2]);
+        }
+        if with.colors {
+            geometry.colors.clone_from(&group.colors);
+            geometry.colors.resize(exact.len(), [1.0; 4]);
         }
         Self { part, is_far: fit.is_far, exact, placed_texcoords, geometry, notes }
     }
@@ -173,10 +200,21 @@ impl<'a> Builder<'a> {
                         placed_texcoords.push(uv.into());
                     }
                 }
+                push_mean(&mut geometry.second_texcoords, vertices, corner.weights);
+                push_mean(&mut geometry.colors, vertices, corner.weights);
             }
             let fan = (1..piece.len() as u32 - 1).map(|i| [first, first + i, first + i + 1]);
             geometry.triangles.extend(fan.map(|vertices| Triangle { vertices, material: part.material }));
         }
+    }
+}
+
+/// Adds the weighted mean of the values of three vertices, if there are values.
+fn push_mean<const N: usize>(values: &mut Vec<[f32; N]>, vertices: [u32; 3], weights: DVec3) {
+    if !values.is_empty() {
+        let ends = vertices.map(|vertex| values[vertex as usize]);
+        let mean = |k: usize| (0..3).map(|i| weights[i] * f64::from(ends[i][k])).sum::<f64>() as f32;
+        values.push(core::array::from_fn(mean));
     }
 }
 
@@ -210,9 +248,7 @@ fn unit_normal(n: DVec3, notes: &mut Notes) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::load::obj::Group;
     use crate::load::placed::Placement;
-    use crate::load::texcoords::Texcoords;
     use glam::DMat3;
 
     fn triangle(positions: [[f64; 3]; 3]) -> Group {

@@ -35,6 +35,10 @@ pub struct LoadedInstances {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates; as long as `positions`, or empty.
     pub texcoords: Vec<[f32; 2]>,
+    /// Texture coordinates of a second set; as long as `positions`, or empty.
+    pub second_texcoords: Vec<[f32; 2]>,
+    /// Linear RGBA of the vertices; as long as `positions`, or empty.
+    pub colors: Vec<[f32; 4]>,
     /// Triangles of all prototypes.
     pub triangles: Vec<Triangle>,
     /// Overlaps of all prototypes.
@@ -54,6 +58,8 @@ impl LoadedInstances {
             positions: &self.positions,
             normals: &self.normals,
             texcoords: &self.texcoords,
+            second_texcoords: &self.second_texcoords,
+            colors: &self.colors,
             triangles: &self.triangles,
             overlaps: &self.overlaps,
             prototypes: &self.prototypes,
@@ -191,14 +197,10 @@ impl Builder {
         all.positions.extend(geometry.positions);
         all.triangles.extend(geometry.triangles);
         all.overlaps.extend(overlaps);
-        if !geometry.normals.is_empty() {
-            all.normals.resize(first[0] as usize, [0.0; 3]);
-            all.normals.extend(geometry.normals);
-        }
-        if !geometry.texcoords.is_empty() {
-            all.texcoords.resize(first[0] as usize, [0.0; 2]);
-            all.texcoords.extend(geometry.texcoords);
-        }
+        append(&mut all.normals, first[0], [0.0; 3], geometry.normals);
+        append(&mut all.texcoords, first[0], [0.0; 2], geometry.texcoords);
+        append(&mut all.second_texcoords, first[0], [0.0; 2], geometry.second_texcoords);
+        append(&mut all.colors, first[0], [1.0; 4], geometry.colors);
         let end = [all.positions.len(), all.triangles.len(), all.overlaps.len()].map(|n| n as u32);
         let [vertices, triangles, overlaps] = [0, 1, 2].map(|i| [first[i], end[i]]);
         all.prototypes.push(Prototype::new(&all.positions, vertices, triangles, overlaps));
@@ -215,12 +217,10 @@ impl Builder {
     ) -> Result<LoadedInstances, u64> {
         let Self { mut loaded, transforms } = self;
         let vertices = loaded.positions.len();
-        if !loaded.normals.is_empty() {
-            loaded.normals.resize(vertices, [0.0; 3]);
-        }
-        if !loaded.texcoords.is_empty() {
-            loaded.texcoords.resize(vertices, [0.0; 2]);
-        }
+        complete(&mut loaded.normals, vertices, [0.0; 3]);
+        complete(&mut loaded.texcoords, vertices, [0.0; 2]);
+        complete(&mut loaded.second_texcoords, vertices, [0.0; 2]);
+        complete(&mut loaded.colors, vertices, [1.0; 4]);
         for (mesh, prototype) in meshes.iter().zip(&shared.of_mesh) {
             let Some(prototype) = *prototype else { continue };
             let own = &transforms[prototype as usize];
@@ -232,6 +232,22 @@ impl Builder {
         Instances::number(triangles, &loaded.prototypes, &mut loaded.placed)
             .map_err(|_| triangles as u64 + loaded.of_core().triangle_count())?;
         Ok(loaded)
+    }
+}
+
+/// Appends the values of the vertices from `first` on, if there are any; vertices before without a value
+/// have `absent`.
+fn append<T: Clone>(all: &mut Vec<T>, first: u32, absent: T, values: Vec<T>) {
+    if !values.is_empty() {
+        all.resize(first as usize, absent);
+        all.extend(values);
+    }
+}
+
+/// Gives the last vertices of `vertices` the value `absent`, if others have one.
+fn complete<T: Clone>(all: &mut Vec<T>, vertices: usize, absent: T) {
+    if !all.is_empty() {
+        all.resize(vertices, absent);
     }
 }
 

@@ -45,6 +45,8 @@ pub struct MapOptions {
     pub channel: Option<Channel>,
     /// Not in MTL: opacity is 1 from this alpha on, and 0 below.
     pub threshold: Option<f64>,
+    /// Not in MTL: the second set of texture coordinates is meant.
+    pub second_set: bool,
     /// Options without effect.
     pub unsupported: Vec<Name>,
 }
@@ -58,6 +60,7 @@ impl Default for MapOptions {
             bump_multiplier: None,
             channel: None,
             threshold: None,
+            second_set: false,
             unsupported: Vec::new(),
         }
     }

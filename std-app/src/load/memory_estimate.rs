@@ -121,6 +121,8 @@ pub(super) fn of_mesh(obj: &Obj) -> usize {
         size_of_val(&group.positions[..])
             + size_of_val(&group.normals[..])
             + size_of_val(&group.texcoords[..])
+            + size_of_val(&group.second_texcoords[..])
+            + size_of_val(&group.colors[..])
             + size_of_val(&group.triangles[..])
             + size_of_val(&group.objects[..])
             + size_of::<Group>()
@@ -134,6 +136,8 @@ pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
     let is_searched =
         |material: &Material| material.emits() || matches!(material.surface, Surface::Dielectric { .. });
     let are_several = parts.windows(2).any(|pair| pair[0].material != pair[1].material);
+    let of_more = 32 * usize::from(parts.iter().any(|part| !part.group.second_texcoords.is_empty()))
+        + 32 * usize::from(parts.iter().any(|part| !part.group.colors.is_empty()));
     let of_part = |part: &Placed| {
         let searched = materials.get(part.material as usize).is_some_and(is_searched);
         let of_triangle = match (searched, are_several) {
@@ -141,7 +145,8 @@ pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
             (false, true) => 120,
             (false, false) => 40,
         };
-        96 * part.group.positions.len() + of_triangle * part.group.triangles.len()
+        // Vertices of other parts have a second set and colours as well if one part does.
+        (96 + of_more) * part.group.positions.len() + of_triangle * part.group.triangles.len()
     };
     parts.iter().fold(0, |sum, part| sum.saturating_add(of_part(part)))
 }

@@ -42,6 +42,12 @@ pub struct MtlMaterial {
     pub exact: bool,
     /// Not in MTL: both sides emit.
     pub two_sided: bool,
+    /// Not in MTL: weight and sqrt(alpha) of a clear coat.
+    pub coat: Option<[f64; 2]>,
+    /// Not in MTL: vertex colours are a factor on the input of this map.
+    pub vertex_color: Option<MapKind>,
+    /// Not in MTL: the alpha of vertex colours is a factor on `d`.
+    pub vertex_alpha: bool,
     /// Texture statements.
     pub maps: BTreeMap<MapKind, Map>,
 }
@@ -65,6 +71,12 @@ pub enum MapKind {
     Bump,
     /// `norm`, `map_Kn`: tangent-space normals.
     Normal,
+    /// Not in MTL: alpha is a factor on `Ks`.
+    SpecularLevel,
+    /// Not in MTL: red is a factor on the weight of a clear coat.
+    Coat,
+    /// Not in MTL: green is a factor on the roughness of a clear coat.
+    CoatRoughness,
 }
 
 impl MtlMaterial {

@@ -4,7 +4,7 @@
 use super::buffers::Geometry;
 use super::notes::Notes;
 use glam::Vec3;
-use halflight_core::scene::{Material, Surface};
+use halflight_core::scene::{Material, Surface, Triangle};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// Least index of sheets that are panes: water has 1.33, and its surface is a flat sheet of glass too.
@@ -40,10 +40,13 @@ pub(super) fn repair(
                 continue;
             }
         }
+        let which = match (count, roots.len()) {
+            (0, flat) => format!("has {flat} flat pieces of two faces"),
+            (_, open) => format!("is open ({count} edges of one face, in {open} of its pieces)"),
+        };
         let what = format!(
-            "glass `{name}` is open ({count} edges of one face, in {} of its pieces): everything \
-             behind it is its inside; `kind = \"pane\"` in a scene file makes it thin",
-            roots.len()
+            "glass `{name}` {which}: everything behind it is its inside; `kind = \"pane\"` in a scene \
+             file makes it thin"
         );
         notes.add(1, what);
     }
@@ -67,7 +70,8 @@ fn is_flat(geometry: &Geometry, material: u32) -> bool {
     })
 }
 
-/// Number of open edges of each glass, roots of the pieces that have them, and number of all its pieces.
+/// Number of open edges of each glass, roots of the pieces that have them or are flat with two faces at each
+/// edge, and number of all its pieces.
 fn open(geometry: &Geometry, materials: &[Material]) -> BTreeMap<u32, (u64, BTreeSet<u32>, usize)> {
     let is_glass = |t: u32| matches!(materials[t as usize].surface, Surface::Dielectric { .. });
     if !(0..materials.len() as u32).any(is_glass) {
@@ -98,8 +102,14 @@ fn open(geometry: &Geometry, materials: &[Material]) -> BTreeMap<u32, (u64, BTre
         }
     }
     edges.retain(|_, (faces, _)| *faces == 1);
-    if edges.is_empty() {
-        return BTreeMap::new();
+    let with_edges: HashSet<u32> = edges.keys().map(|edge| pieces.root(edge[0])).collect();
+    let mut open: BTreeMap<u32, (u64, BTreeSet<u32>, usize)> = BTreeMap::new();
+    // A square of two faces whose diagonals cross has two faces at each edge.
+    let is_glass_triangle = |triangle: &&Triangle| is_glass(triangle.material);
+    for (root, material) in flat(geometry, is_glass_triangle, |v| pieces.root(points[&position(v)])) {
+        if !with_edges.contains(&root) {
+            open.entry(material).or_default().1.insert(root);
+        }
     }
     for triangle in geometry.triangles.iter().filter(|t| !is_glass(t.material)) {
         let corners = triangle.vertices.map(|v| points.get(&position(v)).copied());
@@ -109,7 +119,6 @@ fn open(geometry: &Geometry, materials: &[Material]) -> BTreeMap<u32, (u64, BTre
             }
         }
     }
-    let mut open: BTreeMap<u32, (u64, BTreeSet<u32>, usize)> = BTreeMap::new();
     for (edge, (_, material)) in edges {
         let (count, roots, _) = open.entry(material).or_default();
         *count += 1;
@@ -120,6 +129,25 @@ fn open(geometry: &Geometry, materials: &[Material]) -> BTreeMap<u32, (u64, BTre
         *all = corners.into_iter().map(|corner| pieces.root(corner)).collect::<BTreeSet<_>>().len();
     }
     open
+}
+
+/// Pieces whose triangles all lie in one plane: roots, and the material.
+fn flat(
+    geometry: &Geometry,
+    is_glass: impl Fn(&&Triangle) -> bool,
+    mut root: impl FnMut(u32) -> u32,
+) -> Vec<(u32, u32)> {
+    let mut planes: HashMap<u32, (Vec3, Vec3, u32, bool)> = HashMap::new();
+    for triangle in geometry.triangles.iter().filter(is_glass) {
+        let corners = triangle.vertices.map(|v| Vec3::from(geometry.positions[v as usize]));
+        let [along, across] = [corners[1] - corners[0], corners[2] - corners[0]];
+        let normal = along.cross(across).normalize_or_zero();
+        let plane = planes.entry(root(triangle.vertices[0]));
+        let (origin, of_piece, _, is_flat) = plane.or_insert((corners[0], normal, triangle.material, true));
+        let bound = FLAT * along.length().max(across.length());
+        *is_flat &= corners.iter().all(|&corner| of_piece.dot(corner - *origin).abs() <= bound);
+    }
+    planes.into_iter().filter(|(_, plane)| plane.3).map(|(root, plane)| (root, plane.2)).collect()
 }
 
 fn edges_of([a, b, c]: [u32; 3]) -> impl Iterator<Item = [u32; 2]> {

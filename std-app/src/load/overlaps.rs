@@ -96,13 +96,10 @@ pub(super) fn both_orders(pairs: &[Pair]) -> Vec<Overlap> {
 /// True if a triangle and a copy of it look the same.
 fn is_plain(material: &Material) -> bool {
     let is_constant = match &material.surface {
-        Surface::Diffuse { reflectance } | Surface::Mirror { reflectance } => reflectance.texture.is_none(),
-        Surface::Conductor { reflectance, roughness } => {
-            reflectance.texture.is_none() && roughness.texture.is_none()
-        }
+        Surface::Diffuse { reflectance } | Surface::Mirror { reflectance } => !reflectance.varies(),
+        Surface::Conductor { reflectance, roughness } => !reflectance.varies() && !roughness.varies(),
         Surface::Glossy { base, specular, roughness, metallic, .. } => {
-            let [base, specular] = [base, specular].map(|colour| colour.texture.is_none());
-            base && specular && roughness.texture.is_none() && metallic.texture.is_none()
+            !(base.varies() || specular.varies() || roughness.varies() || metallic.varies())
         }
         Surface::Pane { .. } | Surface::Dielectric { .. } => false,
     };

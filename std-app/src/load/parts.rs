@@ -104,7 +104,7 @@ impl SceneParts {
             normals: mesh.normals.to_vec(),
             texcoords: mesh.texcoords.to_vec(),
             triangles: mesh.triangles.to_vec(),
-            objects: Vec::new(),
+            ..Group::default()
         };
         let obj = Obj { groups: vec![group], materials: vec![name.into()], ..Obj::default() };
         let builder = &mut self.builder;

@@ -68,7 +68,14 @@ mod tests {
 
     fn square(size: u32, texels: &[[u8; 4]]) -> Texture<'_> {
         let transform = TextureTransform::IDENTITY;
-        Texture { width: size, height: size, texels: Texels::Linear8(texels), wrap: Wrap::REPEAT, transform }
+        Texture {
+            width: size,
+            height: size,
+            texels: Texels::Linear8(texels),
+            wrap: Wrap::REPEAT,
+            transform,
+            second_set: false,
+        }
     }
 
     /// A normal with slope `x` along u, in 0 ... 1.

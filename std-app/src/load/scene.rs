@@ -22,6 +22,10 @@ pub struct LoadedScene {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates; as long as `positions`, or empty.
     pub texcoords: Vec<[f32; 2]>,
+    /// Texture coordinates of a second set; as long as `positions`, or empty.
+    pub second_texcoords: Vec<[f32; 2]>,
+    /// Linear RGBA of the vertices; as long as `positions`, or empty.
+    pub colors: Vec<[f32; 4]>,
     /// All triangles.
     pub triangles: Vec<Triangle>,
     /// Pairs of triangles that overlap in one plane, in both orders, ascending.
@@ -152,6 +156,8 @@ impl LoadedScene {
             positions: &self.positions,
             normals: &self.normals,
             texcoords: &self.texcoords,
+            second_texcoords: &self.second_texcoords,
+            colors: &self.colors,
             triangles: &self.triangles,
             overlaps: &self.overlaps,
             instances: self.instances.of_core(),

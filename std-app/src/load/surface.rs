@@ -1,6 +1,7 @@
 //! Meaning of MTL statements: from [`MtlMaterial`] to the core's [`Material`], by the conventions of
 //! `docs/loading.md`. `docs/decisions/loading.md` explains the conventions for plastics.
 
+mod coat;
 mod inputs;
 
 use super::illum::{self, DARK_BASE, is_glass, is_pbr};
@@ -217,9 +218,9 @@ impl Resolver<'_> {
     }
 
     fn specular(&mut self) -> ColorInput {
-        let texture = self.textures.colour(self.mtl.map(MapKind::Specular));
+        let texture = self.specular_texture();
         let factor = self.factor("Ks", self.mtl.specular, [1.0; 3], texture.is_some());
-        ColorInput { value: self.reflectance("Ks", factor), texture }
+        ColorInput { texture, ..self.reflectance("Ks", factor).into() }
     }
 }
 

@@ -88,7 +88,8 @@ pub(super) fn subtract_periods(texcoords: &Texcoords, placed: &[[f64; 2]], geome
     // The vertex for a vertex of the file minus a multiple of the step.
     let mut vertices: HashMap<(u32, [i64; 2]), u32> = HashMap::new();
     let mut is_taken = vec![false; placed.len()];
-    for triangle in &mut geometry.triangles {
+    let mut triangles = core::mem::take(&mut geometry.triangles);
+    for triangle in &mut triangles {
         let corners = triangle.vertices.map(|v| placed[v as usize]);
         let steps = [0, 1].map(|i| {
             let least = corners.iter().map(|uv| uv[i]).fold(f64::INFINITY, f64::min);
@@ -105,15 +106,13 @@ pub(super) fn subtract_periods(texcoords: &Texcoords, placed: &[[f64; 2]], geome
                     geometry.texcoords[old] = uv;
                     return old as u32;
                 }
-                geometry.positions.push(geometry.positions[old]);
+                geometry.push_copy(old);
                 geometry.texcoords.push(uv);
-                if !geometry.normals.is_empty() {
-                    geometry.normals.push(geometry.normals[old]);
-                }
                 geometry.positions.len() as u32 - 1
             });
         }
     }
+    geometry.triangles = triangles;
     blurred
 }
 

@@ -81,7 +81,7 @@ pub(super) fn view(picture: &Picture, content: Content, wrap: Wrap) -> Texture<'
         (Samples::Words(_), _) => Texels::Float(&[]),
     };
     let transform = TextureTransform::IDENTITY;
-    Texture { width: picture.width, height: picture.height, texels, wrap, transform }
+    Texture { width: picture.width, height: picture.height, texels, wrap, transform, second_set: false }
 }
 
 #[cfg(test)]

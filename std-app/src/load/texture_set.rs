@@ -1,6 +1,8 @@
 //! Textures of a scene. Each picture is decoded once and has a view per use: colours or numbers, repeated or
 //! clamped.
 
+mod combined;
+
 use super::bytes::Bytes;
 use super::error::LoadError;
 use super::map::{Channel, Map, MapOptions};
@@ -32,6 +34,8 @@ pub struct TextureSet {
     by_file: HashMap<PathBuf, usize>,
     /// Pictures of single channels of others, or of a threshold on them.
     derived: HashMap<(usize, Channel, Option<u64>), usize>,
+    /// Pictures that are functions of others.
+    combined: HashMap<combined::Key, usize>,
     /// Bytes that derived pictures may take.
     spare: usize,
     views: Vec<View>,
@@ -45,6 +49,7 @@ struct View {
     content: Content,
     wrap: Wrap,
     transform: TextureTransform,
+    second_set: bool,
 }
 
 impl TextureSet {
@@ -215,14 +220,19 @@ impl TextureSet {
         Some(self.view_of(self.derived[&key], map, Content::Alpha))
     }
 
-    /// Bytes of the pictures of single channels.
+    /// Bytes of the pictures of single channels, and of functions of others.
     pub(super) fn derived_bytes(&self) -> usize {
-        self.derived.values().map(|&number| self.pictures[number].bytes()).sum()
+        self.derived.values().chain(self.combined.values()).map(|&number| self.pictures[number].bytes()).sum()
     }
 
     /// The kind of relief in the picture of a map; `None` if it was not decoded.
     pub(super) fn relief(&self, map: &Map) -> Option<Relief> {
         Some(relief::classify(&texture::view(self.picture(map)?, Content::Data, Wrap::REPEAT)))
+    }
+
+    /// True if the picture of a map was decoded.
+    pub(super) fn has(&self, map: &Map) -> bool {
+        self.picture(map).is_some()
     }
 
     /// True if the picture of a map was decoded and has an alpha channel.
@@ -238,7 +248,7 @@ impl TextureSet {
     pub fn views(&self) -> Vec<Texture<'_>> {
         let view = |view: &View| {
             let texture = texture::view(&self.pictures[view.picture], view.content, view.wrap);
-            Texture { transform: view.transform, ..texture }
+            Texture { transform: view.transform, second_set: view.second_set, ..texture }
         };
         self.views.iter().map(view).collect()
     }
@@ -266,10 +276,10 @@ impl TextureSet {
 
     /// The view of a picture by the options of a map.
     fn view_of(&mut self, picture: usize, map: &Map, content: Content) -> TextureId {
-        let MapOptions { scale, offset, wrap, .. } = map.options;
+        let MapOptions { scale, offset, wrap, second_set, .. } = map.options;
         let [scale, offset] = [scale, offset].map(|uv| uv.map(|x| x as f32).into());
         let transform = TextureTransform { scale, offset };
-        let view = View { picture, content, wrap, transform };
+        let view = View { picture, content, wrap, transform, second_set };
         let id = self.views.iter().position(|known| *known == view).unwrap_or_else(|| {
             self.views.push(view);
             self.views.len() - 1

@@ -5,7 +5,7 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, BsdfSample};
 use halflight_core::sampling::Random;
 use halflight_core::scene::Camera;
-use halflight_core::scene::{ColorInput, Material, Mesh, ScalarInput, Scene, Surface};
+use halflight_core::scene::{Attributes, ColorInput, Material, Mesh, ScalarInput, Scene, Surface};
 
 /// A scene without meshes, lights and textures.
 pub(crate) fn empty_scene() -> Scene<'static> {
@@ -21,7 +21,7 @@ pub(crate) fn empty_scene() -> Scene<'static> {
 
 pub(crate) fn resolve(surface: Surface, front: bool) -> Bsdf {
     let material = Material { surface, ..Material::GREY };
-    Bsdf::at::<All>(&empty_scene(), &material, Vec2::splat(0.5), front)
+    Bsdf::at::<All>(&empty_scene(), &material, &Attributes::of_uv(Vec2::splat(0.5)), front)
 }
 
 /// Input `roughness` whose square is `alpha`.

@@ -114,10 +114,10 @@ fn no_input_makes_a_number_that_is_none() {
 
 #[test]
 fn textures_out_of_place_do_no_harm() {
-    use halflight_core::scene::{ColorInput, TextureId};
+    use halflight_core::scene::{Attributes, ColorInput, TextureId};
     let scene = empty_scene();
-    let missing = ColorInput { value: Rgb::splat(0.25), texture: Some(TextureId(77)) };
-    assert_eq!(missing.at::<All>(&scene, Vec2::splat(f32::NAN)), Rgb::splat(0.25));
-    let scalar = ScalarInput { value: 0.5, texture: Some((TextureId(3), 200)) };
-    assert_eq!(scalar.at::<All>(&scene, Vec2::ZERO), 0.5);
+    let missing = ColorInput { texture: Some(TextureId(77)), ..Rgb::splat(0.25).into() };
+    assert_eq!(missing.at::<All>(&scene, &Attributes::of_uv(Vec2::splat(f32::NAN))), Rgb::splat(0.25));
+    let scalar = ScalarInput { texture: Some((TextureId(3), 200)), ..0.5.into() };
+    assert_eq!(scalar.at::<All>(&scene, &Attributes::NONE), 0.5);
 }

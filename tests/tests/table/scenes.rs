@@ -121,6 +121,7 @@ pub(crate) static SKY: [Texture<'static>; 1] = [Texture {
     texels: Texels::Float(&SKY_TEXELS),
     wrap: Wrap::REPEAT,
     transform: TextureTransform::IDENTITY,
+    second_set: false,
 }];
 
 /// The scene lit by [`SKY`].
@@ -138,6 +139,7 @@ static CHECKER: [Texture<'static>; 1] = [Texture {
     texels: Texels::Float(&CHECKER_TEXELS),
     wrap: Wrap::REPEAT,
     transform: TextureTransform::IDENTITY,
+    second_set: false,
 }];
 
 /// A room with a checkered floor, under a lamp with holes; a veil hangs in it.

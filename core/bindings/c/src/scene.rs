@@ -212,7 +212,7 @@ impl HalflightMaterial {
             return Err(HalflightStatus::Material);
         }
         let tint = Vec3::from(self.color);
-        let color = ColorInput { value: tint, texture: texture_id(self.color_texture) };
+        let color = ColorInput { texture: texture_id(self.color_texture), ..tint.into() };
         let ior = if self.ior == 0.0 { 1.5 } else { self.ior };
         let roughness = ScalarInput::from(self.roughness);
         let surface = match self.surface {
@@ -230,7 +230,8 @@ impl HalflightMaterial {
             HALFLIGHT_PANE => Surface::Pane { ior: ior.max(1.0), tint },
             _ => return Err(HalflightStatus::Material),
         };
-        let emission = ColorInput { value: self.emission.into(), texture: texture_id(self.emission_texture) };
+        let emission =
+            ColorInput { texture: texture_id(self.emission_texture), ..Vec3::from(self.emission).into() };
         let opacity = ScalarInput::from(1.0 - self.transparency);
         Ok(Material { surface, emission, two_sided: self.emits_on_both_sides, opacity, normal_map: None })
     }
@@ -250,7 +251,7 @@ impl HalflightTexture {
         };
         let texels = texels.map_err(|_| HalflightStatus::Texture)?;
         let wrap = if self.clamps { Wrap::CLAMP } else { Wrap::REPEAT };
-        Ok(Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY })
+        Ok(Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY, second_set: false })
     }
 }
 

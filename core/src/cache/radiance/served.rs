@@ -22,9 +22,9 @@ use crate::bsdf::{Bsdf, MicrofacetLobe};
 use crate::geometry::Frame;
 use crate::light::luminance;
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::scene::{Scene, Surface};
+use crate::scene::{Attributes, Scene, Surface};
 use core::f32::consts::PI;
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec3};
 
 /// Maximum number of distinct indices of refraction of coats; coats of further ones are left to paths.
 const INDICES_MAX: usize = 4;
@@ -224,11 +224,9 @@ impl<'m> ServedLobes<'m> {
     fn degree_of(&self, scene: &Scene, surface: &Surface) -> Option<usize> {
         coat_of(surface)?;
         let inputs = match surface {
-            Surface::Conductor { reflectance, roughness } => {
-                [reflectance.texture.is_some(), roughness.texture.is_some()]
-            }
+            Surface::Conductor { reflectance, roughness } => [reflectance.varies(), roughness.varies()],
             Surface::Glossy { base, specular, roughness, .. } => {
-                [base.texture.is_some() || specular.texture.is_some(), roughness.texture.is_some()]
+                [base.varies() || specular.varies(), roughness.varies()]
             }
             _ => return None,
         };
@@ -236,7 +234,7 @@ impl<'m> ServedLobes<'m> {
             return Some(self.representation.degree);
         }
         let material = crate::scene::Material { surface: *surface, ..crate::scene::Material::GREY };
-        let bsdf = Bsdf::at::<crate::bsdf::All>(scene, &material, Vec2::ZERO, true);
+        let bsdf = Bsdf::at::<crate::bsdf::All>(scene, &material, &Attributes::NONE, true);
         (0..ANGLES).filter_map(|i| self.needed(&bsdf, libm::cosf(i as f32 * ANGLE_STEP))?.2).max()
     }
 

@@ -156,7 +156,7 @@ impl<'a> Reference<'a> {
                     continue;
                 }
             }
-            let seen = emitted(context.scene, hit.triangle, point.uv, point.front);
+            let seen = emitted(context.scene, hit.triangle, &point.attributes, point.front);
             if seen != Rgb::ZERO {
                 let index = context.lights.emitter_index(hit.triangle).unwrap_or(0);
                 radiance += throughput * seen * weight_of_hit(Light::near(index, point.position));

@@ -15,7 +15,7 @@ use crate::film::Pixel;
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
-use crate::scene::{Material, Scene, SurfacePoint};
+use crate::scene::{Attributes, Material, Scene, SurfacePoint};
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
@@ -23,7 +23,7 @@ use crate::transport::walk::path_classes::PathClasses;
 use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
 use core::ops::Range;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use halflight_simd::kernels::shade::BLOCK;
 
 /// The surface that stands for a point: π times its reflected radiance is the irradiance.
@@ -173,7 +173,7 @@ impl IrradiancePoint {
             error: self.error,
             geometric_normal: self.geometric_normal.into(),
             frame: Frame::from_normal(self.normal.into()),
-            uv: Vec2::ZERO,
+            attributes: Attributes::NONE,
             front: true,
             material: &WHITE_MATERIAL,
             triangle: self.triangle,

@@ -129,7 +129,7 @@ impl<'a, F: Features, E: LightEstimator<F>, R: Sharing> PathIntegrator<'a, F, E,
             return;
         }
         let (scene, triangle) = (self.context.scene, point.triangle);
-        let radiance = emitted(scene, triangle, point.uv, point.front);
+        let radiance = emitted(scene, triangle, &point.attributes, point.front);
         if radiance == Rgb::ZERO {
             return;
         }

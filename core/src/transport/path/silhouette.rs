@@ -185,8 +185,11 @@ pub(in crate::transport) fn emission<F: Features>(
         let Some(point) = context.surface_at(&ray, &hit) else { break };
         if hit.triangle != left && !point.is_left_by(&ray) {
             let emits = point.material.emits();
-            let light =
-                if emits { emitted(context.scene, hit.triangle, point.uv, point.front) } else { Rgb::ZERO };
+            let light = if emits {
+                emitted(context.scene, hit.triangle, &point.attributes, point.front)
+            } else {
+                Rgb::ZERO
+            };
             return light / RAYS_PER_SAMPLE as f32;
         }
         left = hit.triangle;

@@ -79,7 +79,7 @@ impl Start {
     /// Emission of the surface at `point` and its MIS weight.
     fn emission(&self, context: &SceneContext<All>, point: &SurfacePoint, direction: Vec3) -> (Rgb, f32) {
         let (scene, lights) = (context.scene, &context.lights);
-        let seen = emitted(scene, point.triangle, point.uv, point.front);
+        let seen = emitted(scene, point.triangle, &point.attributes, point.front);
         if seen == Rgb::ZERO {
             return (seen, 0.0);
         }

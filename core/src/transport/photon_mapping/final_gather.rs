@@ -270,8 +270,7 @@ mod tests {
     use crate::geometry::Frame;
     use crate::photon::{lines, with_map_of};
     use crate::sampling::Random;
-    use crate::scene::{Material, Mesh, Triangle};
-    use glam::Vec2;
+    use crate::scene::{Attributes, Material, Mesh, Triangle};
     use std::vec;
     use std::vec::Vec;
 
@@ -326,7 +325,7 @@ mod tests {
                 error: 1e-7,
                 geometric_normal: Vec3::Z,
                 frame: Frame::from_normal(Vec3::Z),
-                uv: Vec2::ZERO,
+                attributes: Attributes::NONE,
                 front: true,
                 material: &material,
                 triangle: 1,

@@ -5,11 +5,12 @@ use crate::Level;
 use crate::bsdf::{COATS, Features};
 use crate::geometry::Ray;
 use crate::light::{ChosenLight, LightSample, emitted};
+use crate::scene::Attributes;
 use crate::transport::walk::block::Block;
 use crate::transport::walk::block_stages::Numbered;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::points::Set;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use halflight_simd::kernels::shade::coat::CoatLight;
 use halflight_simd::kernels::shade::coat_apart::ApartLight;
 use halflight_simd::kernels::shade::direct::Direct;
@@ -172,7 +173,7 @@ impl Block<'_> {
         let mut bright = 0;
         for i in Set(samples.exists) {
             let triangle = block.lamp[i] + (samples.second >> i & 1);
-            let radiance = emitted(context.scene, triangle, Vec2::ZERO, samples.front >> i & 1 == 1);
+            let radiance = emitted(context.scene, triangle, &Attributes::NONE, samples.front >> i & 1 == 1);
             put(&mut block.light.radiance, i, radiance.to_array());
             bright |= u32::from(radiance.max_element() > 0.0) << i;
         }

@@ -113,7 +113,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// BSDF at `point`.
     #[inline]
     pub(crate) fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
-        Bsdf::at::<F>(self.scene, point.material, point.uv, point.front)
+        Bsdf::at::<F>(self.scene, point.material, &point.attributes, point.front)
     }
 
     /// True if photons are stored only on the bases of narrow coats ([`Bsdf::gathers_photons_on_base`]),
@@ -191,7 +191,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// Opacity at `point`: 1 unless its material is a cut-out.
     #[inline]
     pub(crate) fn opacity_at(&self, point: &SurfacePoint) -> f32 {
-        if F::CUTOUT { point.material.opacity.at::<F>(self.scene, point.uv).min(1.0) } else { 1.0 }
+        if F::CUTOUT { point.material.opacity.at::<F>(self.scene, &point.attributes).min(1.0) } else { 1.0 }
     }
 
     /// Follows `segment` to the next scattering surface; a cut-out after n surfaces uses `random(n)`. `None`

@@ -5,7 +5,7 @@
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::geometry::{Frame, Hit, Ray};
-use crate::scene::{Material, Scene, SurfacePoint, load};
+use crate::scene::{Attributes, Material, Scene, SurfacePoint, load};
 use crate::transport::walk::context::SceneContext;
 use bytemuck::Zeroable;
 use glam::{Vec2, Vec3};
@@ -21,7 +21,7 @@ pub(crate) struct PointBlock<'a> {
     pub(crate) surface: SurfaceBlock,
     pub(crate) triangle: [u32; BLOCK],
     pub(crate) material: [&'a Material; BLOCK],
-    uv: [Vec2; BLOCK],
+    attributes: [Attributes; BLOCK],
     textures: TextureBlock,
     /// Set of hits whose colours were looked up in lanes, and their texels.
     textured: u32,
@@ -46,7 +46,7 @@ impl<'a> PointBlock<'a> {
             surface: SurfaceBlock::EMPTY,
             triangle: [0; BLOCK],
             material: [&GREY; BLOCK],
-            uv: [Vec2::ZERO; BLOCK],
+            attributes: [Attributes::NONE; BLOCK],
             textures: TextureBlock::EMPTY,
             textured: 0,
             texel: [[0.0; BLOCK]; 3],
@@ -161,14 +161,20 @@ impl<'a> PointBlock<'a> {
         };
         surfaces.compute(context.level, &mut self.surface);
         Set(met & self.placed).for_each(|i| self.surface.error[i] += self.more_error[i]);
-        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
+        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && scene.has_attributes() {
             for i in Set(met) {
                 let t = match self.placed >> i & 1 {
                     0 => scene.mesh.corner_texcoords(self.triangle[i]),
                     _ => self.texcoords[i],
                 };
                 let (u, v) = (self.weights[0][i], self.weights[1][i]);
-                self.uv[i] = (1.0 - u - v) * t[0] + u * t[1] + v * t[2];
+                self.attributes[i].uv[0] = (1.0 - u - v) * t[0] + u * t[1] + v * t[2];
+            }
+            if scene.mesh.has_more_attributes() {
+                for i in Set(met) {
+                    let weights = [self.weights[0][i], self.weights[1][i]];
+                    scene.mesh.add_attributes(self.triangle[i], weights, &mut self.attributes[i]);
+                }
             }
             if F::TEXTURES {
                 self.look_up_colors(context, met);
@@ -190,7 +196,7 @@ impl<'a> PointBlock<'a> {
         for i in Set(met) {
             let id = self.material[i].surface.color().and_then(|color| color.texture);
             let Some(texture) = id.and_then(|id| scene.textures.get(id.0 as usize)) else { continue };
-            if let Some(found) = texture.put(&mut self.textures, i, self.uv[i]) {
+            if let Some(found) = texture.put(&mut self.textures, i, texture.uv(&self.attributes[i])) {
                 texels[i] = found;
                 self.textured |= 1 << i;
             }
@@ -214,7 +220,7 @@ impl<'a> PointBlock<'a> {
         }
         put(&mut surface.wo, i, point.frame.to_local(-direction).to_array());
         surface.front = surface.front & !(1 << i) | u32::from(point.front) << i;
-        self.uv[i & 15] = point.uv;
+        self.attributes[i & 15] = point.attributes;
     }
 
     /// Surface point of hit `i`.
@@ -232,7 +238,7 @@ impl<'a> PointBlock<'a> {
                 bitangent: at(bitangent, i).into(),
                 normal: at(normal, i).into(),
             },
-            uv: self.uv[i],
+            attributes: self.attributes[i],
             front: self.is_front(i),
             material: self.material[i],
             triangle: self.triangle[i],
@@ -256,7 +262,7 @@ impl<'a> PointBlock<'a> {
     pub(crate) fn bsdf<F: Features>(&self, scene: &Scene, i: usize) -> Bsdf {
         let i = i & 15;
         let texel = (F::TEXTURES && self.textured >> i & 1 == 1).then(|| Rgb::from(at(&self.texel, i)));
-        Bsdf::of_texel::<F>((scene, self.material[i]), texel, self.uv[i], self.is_front(i))
+        Bsdf::of_texel::<F>((scene, self.material[i]), texel, &self.attributes[i], self.is_front(i))
     }
 }
 

@@ -90,7 +90,7 @@ impl<F: Features> Walk<'_, F> {
     ) -> Option<Weighted> {
         let Self { context, emission, .. } = self;
         let (scene, lights) = (context.scene, &context.lights);
-        let radiance = emitted(scene, point.triangle, point.uv, point.front);
+        let radiance = emitted(scene, point.triangle, &point.attributes, point.front);
         self.hit(subpath, radiance, |position, normal| {
             let from = (point.position, -direction);
             let density = match self.has_light_paths() {

@@ -57,7 +57,7 @@ impl Scatterer<'_> {
     #[inline]
     fn behind<F: Features>(&self, context: &SceneContext<F>) -> Bsdf {
         let point = self.point;
-        Bsdf::at::<F>(context.scene, point.material, point.uv, !point.front)
+        Bsdf::at::<F>(context.scene, point.material, &point.attributes, !point.front)
     }
 
     /// Scattering between local directions `wo` to the camera and `wi` to the light, on the side of the

@@ -141,12 +141,12 @@ impl Distant {
 
 /// A colour and its texture.
 fn color(&(value, texture): &Input<[f32; 3]>, ids: &[TextureId]) -> ColorInput {
-    ColorInput { value: value.into(), texture: texture.and_then(|at| ids.get(at).copied()) }
+    ColorInput { texture: texture.and_then(|at| ids.get(at).copied()), ..Rgb::from(value).into() }
 }
 
 /// A number and the first channel of its texture.
 fn scalar(&(value, texture): &Input<f32>, ids: &[TextureId]) -> ScalarInput {
-    ScalarInput { value, texture: texture.and_then(|at| Some((*ids.get(at)?, 0))) }
+    ScalarInput { texture: texture.and_then(|at| Some((*ids.get(at)?, 0))), ..value.into() }
 }
 
 impl MaterialParts {

@@ -37,7 +37,7 @@ objects! {
     }
     /// The version alone: objects of glTF 1.0 are others.
     Versioned { asset: Asset, }
-    Asset { version: String, min_version: Option<String>, }
+    Asset { version: String, min_version: Option<String>, generator: String, }
     OfDocument { #[serde(rename = "KHR_lights_punctual")] lights: Lights, }
     Lights { lights: Vec<Light>, }
     Scene { nodes: Vec<usize>, }
@@ -78,6 +78,8 @@ objects! {
         #[serde(rename = "NORMAL")] normal: Option<usize>,
         #[serde(rename = "TEXCOORD_0")] texcoord_0: Option<usize>,
         #[serde(rename = "TEXCOORD_1")] texcoord_1: Option<usize>,
+        #[serde(rename = "TEXCOORD_2")] texcoord_2: Option<usize>,
+        #[serde(rename = "TEXCOORD_3")] texcoord_3: Option<usize>,
         #[serde(rename = "COLOR_0")] color_0: Option<usize>,
         #[serde(rename = "JOINTS_0")] joints_0: Option<usize>,
         #[serde(rename = "JOINTS_1")] joints_1: Option<usize>,
@@ -168,6 +170,8 @@ objects! {
         clearcoat_factor: f64,
         clearcoat_texture: Option<TextureInfo>,
         clearcoat_roughness_factor: f64,
+        clearcoat_roughness_texture: Option<TextureInfo>,
+        clearcoat_normal_texture: Option<IgnoredAny>,
     }
     Transmission { transmission_factor: f64, transmission_texture: Option<TextureInfo>, }
     Volume {

@@ -5,7 +5,7 @@ use super::Source;
 use super::accessor::Buffers;
 use super::container;
 use super::json::{self, Material, OfMaterial, TextureInfo};
-use super::texcoords::{MapOfMaterial, MaterialTexcoords, TexcoordsOfMaps, transform_of};
+use super::texcoords::{self, MapOfMaterial, Pair, transform_of};
 use crate::load::bytes::Bytes;
 use crate::load::error::LoadError;
 use crate::load::files::Found;
@@ -27,7 +27,9 @@ pub(super) struct Materials {
     /// By the index in the file; `None` for primitives without material.
     numbers: HashMap<Option<usize>, usize>,
     materials: Vec<MtlMaterial>,
-    texcoords: Vec<MaterialTexcoords>,
+    texcoords: Vec<(Pair, Option<Pair>)>,
+    /// What vertex colours are a factor on, and true if their alpha is one on the opacity.
+    colorable: Vec<(MapKind, bool)>,
     images: HashMap<usize, Option<PathBuf>>,
     pictures: HashMap<PathBuf, Bytes>,
 }
@@ -58,18 +60,29 @@ impl Materials {
         let mut reader = Reader { materials: self, buffers, source, name, maps: Vec::new() };
         let mut mtl = reader.statements(material)?;
         let Reader { name, maps, source, .. } = reader;
-        let texcoords = TexcoordsOfMaps::new(&maps).applied(maps, &name, &mut mtl, source);
+        let texcoords = texcoords::applied(maps, &name, &mut mtl, source);
         mtl.name = name[..].into();
         let number = self.materials.len();
         self.numbers.insert(index, number);
         self.materials.push(mtl);
         self.texcoords.push(texcoords);
+        let kind = if material.extensions.unlit.is_some() { MapKind::Emission } else { MapKind::Diffuse };
+        self.colorable.push((kind, material.alpha_mode.as_deref() == Some("BLEND")));
         Ok(number)
     }
 
     /// Texture coordinates of a material.
-    pub(super) fn texcoords(&self, number: usize) -> MaterialTexcoords {
+    pub(super) fn texcoords(&self, number: usize) -> (Pair, Option<Pair>) {
         self.texcoords[number]
+    }
+
+    /// Makes vertex colours a factor on a material.
+    pub(super) fn color(&mut self, number: usize, source: &mut Source) {
+        let (mtl, (kind, is_blended)) = (&mut self.materials[number], self.colorable[number]);
+        (mtl.vertex_color, mtl.vertex_alpha) = (Some(kind), is_blended);
+        if mtl.pane || mtl.surely_glass {
+            source.note("vertex colours of glass are left out");
+        }
     }
 
     /// The materials, and the pictures by the names of their maps.
@@ -154,18 +167,13 @@ impl Reader<'_, '_> {
             let level = specular.specular_factor.unwrap_or(1.0) * ((ior - 1.0) / (ior + 1.0)).powi(2);
             let color = specular.specular_color_factor.unwrap_or([1.0; 3]);
             mtl.specular = Some(color.map(|channel| (channel * level).clamp(0.0, 1.0)));
-            if specular.specular_texture.is_some() {
-                self.note("`specularTexture` is not supported: left out");
-            }
             if level > 0.0 {
+                self.map(MapKind::SpecularLevel, specular.specular_texture.as_ref(), Some(3))?;
                 self.map(MapKind::Specular, specular.specular_color_texture.as_ref(), None)?;
             }
         }
         if let Some(coat) = extensions.clearcoat.as_ref().filter(|coat| coat.clearcoat_factor > 0.0) {
-            if coat.clearcoat_texture.is_some() {
-                self.note("`clearcoatTexture` is not supported: left out");
-            }
-            self.clearcoat(coat, mtl);
+            self.clearcoat(coat, mtl)?;
         }
         if extensions.unlit.is_some() {
             self.note("is unlit: its colour is its emission");
@@ -182,17 +190,24 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// A coat has one roughness: the clear coat's over a diffuse base, and a metal's own.
-    fn clearcoat(&mut self, coat: &json::Clearcoat, mtl: &mut MtlMaterial) {
+    /// A coat has one roughness: that of the clear coat and the highlight below it over a diffuse base, and a
+    /// metal's own.
+    fn clearcoat(&mut self, coat: &json::Clearcoat, mtl: &mut MtlMaterial) -> Result<(), LoadError> {
         if mtl.metallic != Some(0.0) {
-            return self.note("a clear coat over metal is not supported: left out");
+            self.note("a clear coat over metal is not supported: left out");
+            return Ok(());
         }
         let level = 0.04 * coat.clearcoat_factor.min(1.0);
         let below = mtl.specular.unwrap_or([0.0; 3]);
         mtl.specular = Some(below.map(|channel| channel.max(level)));
-        mtl.roughness = Some(coat.clearcoat_roughness_factor);
-        self.maps.retain(|map| map.kind != MapKind::Roughness);
-        self.note("its clear coat replaces the highlight below it");
+        mtl.coat = Some([coat.clearcoat_factor, coat.clearcoat_roughness_factor]);
+        self.map(MapKind::Coat, coat.clearcoat_texture.as_ref(), Some(0))?;
+        self.map(MapKind::CoatRoughness, coat.clearcoat_roughness_texture.as_ref(), Some(1))?;
+        if coat.clearcoat_normal_texture.is_some() {
+            self.note("the normals of its clear coat are those of its base");
+        }
+        self.note("its clear coat and the highlight below it are one, of their mean roughness");
+        Ok(())
     }
 
     /// Solid glass with a volume, else a thin pane.

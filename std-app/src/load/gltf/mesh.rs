@@ -3,7 +3,7 @@
 use super::Source;
 use super::accessor::{Buffers, Rows};
 use super::json::Primitive;
-use super::texcoords::MaterialTexcoords;
+use super::texcoords::Pair;
 use crate::load::error::LoadError;
 use crate::load::obj::Group;
 use crate::load::placed::Placement;
@@ -13,6 +13,8 @@ use rayon::prelude::*;
 /// Bytes of a vertex while it is read, and of an index.
 const VERTEX: usize = 64;
 const INDEX: usize = 16;
+/// Bytes of a second pair of texture coordinates, or of a colour.
+const MORE: usize = 48;
 
 /// Joints of a skin: transforms from the mesh to the world.
 pub(super) type Joints = [Placement];
@@ -21,7 +23,7 @@ pub(super) type Joints = [Placement];
 pub(super) fn group(
     buffers: &Buffers,
     primitive: &Primitive,
-    texcoords: &MaterialTexcoords,
+    (first, second): (Pair, Option<Pair>),
     joints: Option<&Joints>,
     source: &mut Source,
 ) -> Result<Option<Group>, LoadError> {
@@ -35,9 +37,6 @@ pub(super) fn group(
         source.note("points and lines have no surface: left out");
         return Ok(None);
     }
-    if attributes.color_0.is_some() {
-        source.note("vertex colours are not supported: left out");
-    }
     let positions: Rows<3> = buffers.rows(position)?;
     let indices = indices(buffers, primitive, positions.count, source)?;
     let triangles = triangles(mode, &indices)
@@ -46,15 +45,19 @@ pub(super) fn group(
         source.note("indices after the last whole triangle left out");
     }
     let (used, triangles) = compact(indices, triangles);
-    source.take(VERTEX * used.len())?;
+    let of_vertex =
+        VERTEX + MORE * (usize::from(second.is_some()) + usize::from(attributes.color_0.is_some()));
+    source.take(of_vertex * used.len())?;
 
     let of = |attribute: Option<usize>| attribute.map(|number| same_count(buffers, number, positions.count));
     let normals: Option<Rows<3>> = of(attributes.normal).transpose()?;
-    let set = match texcoords.set {
-        0 => attributes.texcoord_0,
-        _ => attributes.texcoord_1,
+    let sets = [attributes.texcoord_0, attributes.texcoord_1, attributes.texcoord_2, attributes.texcoord_3];
+    let texcoords = |pair: Pair| -> Result<Vec<[f64; 2]>, LoadError> {
+        let Some(number) = sets.get(pair.set as usize).copied().flatten() else { return Ok(Vec::new()) };
+        let rows: Rows<2> = same_count(buffers, number, positions.count)?;
+        Ok(used.par_iter().map(|&v| pair.placed(DVec2::from(rows.row(v as usize))).into()).collect())
     };
-    let uv = set.map(|number| same_count::<2>(buffers, number, positions.count)).transpose()?;
+    let colors = attributes.color_0.map(|number| colors(buffers, number, (positions.count, &used), source));
     let skin = joints.map(|joints| Skinning::new(buffers, primitive, positions.count, joints, source));
     let skin = skin.transpose()?.flatten();
 
@@ -71,12 +74,38 @@ pub(super) fn group(
         positions: used.par_iter().map(|v| vertex(v).into()).collect(),
         normals: normals
             .map_or(Vec::new(), |rows| used.par_iter().map(|&v| normal(v, &rows).into()).collect()),
-        texcoords: uv.map_or(Vec::new(), |rows| {
-            used.par_iter().map(|&v| texcoords.placed(DVec2::from(rows.row(v as usize))).into()).collect()
-        }),
+        texcoords: texcoords(first)?,
+        second_texcoords: second.map(texcoords).transpose()?.unwrap_or_default(),
+        colors: colors.transpose()?.unwrap_or_default(),
         triangles,
         objects: Vec::new(),
     }))
+}
+
+/// Colours of the vertices in use, RGBA, of an accessor with or without alpha and `count` rows.
+fn colors(
+    buffers: &Buffers,
+    number: usize,
+    (count, used): (usize, &[u32]),
+    source: &mut Source,
+) -> Result<Vec<[f32; 4]>, LoadError> {
+    let accessor = buffers.document.accessors.get(number);
+    let colors: Vec<[f64; 4]> = if accessor.is_some_and(|accessor| accessor.kind == "VEC3") {
+        let rows: Rows<3> = same_count(buffers, number, count)?;
+        let color = |&v: &u32| {
+            let [r, g, b] = rows.row(v as usize);
+            [r, g, b, 1.0]
+        };
+        used.par_iter().map(color).collect()
+    } else {
+        let rows: Rows<4> = same_count(buffers, number, count)?;
+        used.par_iter().map(|&v| rows.row(v as usize)).collect()
+    };
+    if colors.as_flattened().iter().any(|x| !(0.0..=1.0).contains(x)) {
+        source.note("vertex colours are limited to 0 ... 1");
+    }
+    let limited = |x: f64| if x.is_nan() { 1.0 } else { x.clamp(0.0, 1.0) as f32 };
+    Ok(colors.iter().map(|color| color.map(limited)).collect())
 }
 
 /// The mode of separate triangles; smaller ones are points and lines.

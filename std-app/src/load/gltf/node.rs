@@ -228,8 +228,12 @@ impl Builder<'_> {
             }
             let material = self.materials.number(self.buffers, primitive.material, source)?;
             let texcoords = self.materials.texcoords(material);
-            let group = mesh::group(self.buffers, primitive, &texcoords, joints.as_deref(), source)?;
-            groups.extend(group.map(|group| Group { material: Some(material), ..group }));
+            let group = mesh::group(self.buffers, primitive, texcoords, joints.as_deref(), source)?;
+            let Some(group) = group else { continue };
+            if !group.colors.is_empty() {
+                self.materials.color(material, source);
+            }
+            groups.push(Group { material: Some(material), ..group });
         }
         Ok(groups)
     }

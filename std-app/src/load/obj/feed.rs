@@ -133,6 +133,7 @@ fn group(mesh: tobj::Mesh, sections: &mut Sections, notes: &mut Notes) -> Group 
         triangles,
         positions,
         objects,
+        ..Group::default()
     }
 }
 

@@ -46,6 +46,10 @@ pub struct Group {
     pub normals: Vec<[f64; 3]>,
     /// As long as `positions`, or empty.
     pub texcoords: Vec<[f64; 2]>,
+    /// Not in OBJ: a second set of texture coordinates. As long as `positions`, or empty.
+    pub second_texcoords: Vec<[f64; 2]>,
+    /// Not in OBJ: linear RGBA of the vertices, 0 … 1. As long as `positions`, or empty.
+    pub colors: Vec<[f32; 4]>,
     /// Counter-clockwise; every index is in range.
     pub triangles: Vec<[u32; 3]>,
     /// Objects of the triangles; empty if none has one.

@@ -29,26 +29,30 @@ impl Resolver<'_> {
             (None, _) => 0.5,
         };
         let factor = self.factor("Kd", mtl.diffuse, [absent; 3], texture.is_some());
-        ColorInput { value: self.reflectance("Kd", factor), texture }
+        let vertex_color = mtl.vertex_color == Some(MapKind::Diffuse);
+        ColorInput { value: self.reflectance("Kd", factor), texture, vertex_color }
     }
 
     /// sqrt(alpha): `Pr`, else from `Ns` by alpha = sqrt(2 / (Ns + 2)).
     pub(super) fn roughness(&mut self) -> ScalarInput {
         let mtl = self.mtl;
+        if let Some(coat) = mtl.coat {
+            return self.coated_roughness(coat);
+        }
         let texture = self.textures.scalar(mtl.map(MapKind::Roughness));
         let from_shininess = |ns: f64| (2.0 / (ns.max(0.0) + 2.0)).powf(0.25);
         // `illum 3` and `5` are smooth by default.
         let absent = if matches!(mtl.illumination, Some(3 | 5)) { 0.0 } else { 1.0 };
         let absent = if texture.is_some() { 1.0 } else { mtl.shininess.map_or(absent, from_shininess) };
         let [value] = self.factor("Pr", mtl.roughness.map(|pr| [pr]), [absent], texture.is_some());
-        ScalarInput { value: self.unit("Pr", value), texture }
+        ScalarInput { texture, ..self.unit("Pr", value).into() }
     }
 
     pub(super) fn metallic(&mut self) -> ScalarInput {
         let texture = self.textures.scalar(self.mtl.map(MapKind::Metallic));
         let absent = if texture.is_some() { 1.0 } else { 0.0 };
         let [value] = self.factor("Pm", self.mtl.metallic.map(|pm| [pm]), [absent], texture.is_some());
-        ScalarInput { value: self.unit("Pm", value), texture }
+        ScalarInput { texture, ..self.unit("Pm", value).into() }
     }
 
     pub(super) fn emission(&mut self) -> ColorInput {
@@ -60,7 +64,8 @@ impl Resolver<'_> {
             self.notes.add(1, format!("Ke of material `{name}` is limited to 0 ... {BRIGHTEST:e}"));
         }
         let value = value.map(|x| x.clamp(0.0, BRIGHTEST) as f32).into();
-        ColorInput { value, texture }
+        let vertex_color = self.mtl.vertex_color == Some(MapKind::Emission);
+        ColorInput { value, texture, vertex_color }
     }
 
     /// The factor on a map, or the value without one; 1 where it hides the map.
@@ -97,7 +102,7 @@ impl Resolver<'_> {
         if value == 0.0 {
             self.notes.add(1, format!("material `{}` is invisible: its opacity is 0", mtl.name));
         }
-        ScalarInput { value, texture }
+        ScalarInput { value, texture, vertex_alpha: mtl.vertex_alpha }
     }
 
     /// `norm`, else `bump`. The picture itself decides if it contradicts its statement.

@@ -107,6 +107,16 @@ fn geometry(scene: &Scene, hash: &mut Hash) {
     hash.section(bytemuck::cast_slice(mesh.texcoords));
     hash.section(bytemuck::cast_slice(mesh.triangles));
     let instances = &mesh.instances;
+    for texcoords in [mesh.second_texcoords, instances.second_texcoords] {
+        if !texcoords.is_empty() {
+            hash.section(bytemuck::cast_slice(texcoords));
+        }
+    }
+    for colors in [mesh.colors, instances.colors] {
+        if !colors.is_empty() {
+            hash.section(bytemuck::cast_slice(colors));
+        }
+    }
     if !instances.is_empty() {
         hash.section(bytemuck::cast_slice(instances.positions));
         hash.section(bytemuck::cast_slice(instances.normals));

@@ -47,6 +47,37 @@ fn candela_and_lux_become_watts() {
     assert!(says(&scene, &["laser"]) && scene.lights.len() == 3);
 }
 
+/// Power of a lamp over its intensity and 2π by the midpoint rule.
+fn power(falloff: impl Fn(f64) -> f64) -> f64 {
+    let angle = |i: u32| (f64::from(i) + 0.5) * 1e-4;
+    (0..15_000).map(angle).map(|angle| falloff(angle) * angle.sin() * 1e-4).sum()
+}
+
+#[test]
+fn spots_of_blender_have_its_soft_edge() {
+    for (blend, outer) in [(0.15, 0.4f64), (0.5, 1.2), (1.0, 0.6)] {
+        let spot = json!({ "innerConeAngle": outer * (1.0 - blend), "outerConeAngle": outer });
+        let mut file = lit(json!([{ "type": "spot", "spot": spot }]));
+        file.json["asset"]["generator"] = json!("Khronos glTF Blender I/O v4.5.47");
+        let PointLight::Spot { cos_inner, cos_outer, .. } = file.loaded().lights[0] else { panic!() };
+        let [inner, end] = [cos_inner, cos_outer].map(|cos| f64::from(cos).acos());
+        let ours = |angle: f64| ((end - angle) / (end - inner)).clamp(0.0, 1.0);
+        let cycles = |angle: f64| {
+            let x = ((angle.cos() - outer.cos()) / (blend * (1.0 - outer.cos()))).clamp(0.0, 1.0);
+            x * x * (3.0 - 2.0 * x)
+        };
+        assert!(
+            (power(ours) / power(cycles) - 1.0).abs() < 1e-3,
+            "{blend}: {} {}",
+            power(ours),
+            power(cycles)
+        );
+        let worst =
+            (0..1500).map(|i| f64::from(i) * 1e-3).map(|x| (ours(x) - cycles(x)).abs()).fold(0.0, f64::max);
+        assert!(worst < 0.075 && end <= outer + 1e-6, "{blend}: {worst}");
+    }
+}
+
 #[test]
 fn senseless_lights_are_limited_or_left_out() {
     let mut file =

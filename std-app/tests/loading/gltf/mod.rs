@@ -1,5 +1,6 @@
 //! glTF files, written by the tests.
 
+mod attributes;
 mod cornell;
 mod hostile;
 mod lights;

@@ -7,7 +7,7 @@ use halflight_core::scene::{NormalMap, ScalarInput, Surface, TextureId, Wrap};
 use serde_json::{Value, json};
 
 /// A square whose texture 0 is this PNG.
-fn textured(png: &[u8], material: Value) -> Gltf {
+pub(super) fn textured(png: &[u8], material: Value) -> Gltf {
     let mut file = Gltf::square(material);
     let view = file.view(png);
     file.json["images"] = json!([{ "bufferView": view, "mimeType": "image/png" }]);
@@ -149,4 +149,52 @@ fn pictures_are_files_data_or_left_out() {
         let scene = load(image);
         assert!(scene.textures.is_empty() && says(&scene, &[words]), "{words}: {:?}", scene.repairs);
     }
+}
+
+/// Reflectance of the coat in the middle, its roughness, and the notes.
+fn coat(extensions: Value) -> ([f32; 3], f32, Vec<String>) {
+    let material = json!({ "pbrMetallicRoughness": { "metallicFactor": 0, "roughnessFactor": 0.5 },
+        "normalTexture": { "index": 0 }, "extensions": extensions });
+    let scene = textured(&pixel([128, 51, 0, 102]), material).loaded();
+    let Surface::Glossy { specular, roughness, .. } = scene.materials[0].surface else { panic!() };
+    let texel = specular.texture.map_or([1.0; 4], |id| texel(&scene, id, [0.5; 2]));
+    let value = specular.value.to_array();
+    let roughness = if roughness.texture.is_some() { scalar(&scene, roughness) } else { roughness.value };
+    (core::array::from_fn(|i| value[i] * texel[i]), roughness, scene.repairs)
+}
+
+fn near(a: &[f32], b: &[f32]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)
+}
+
+#[test]
+fn textures_of_speculars_multiply() {
+    let of = |specular: Value| coat(json!({ "KHR_materials_specular": specular }));
+    // 102 of 255 is 0.4, of the reflectance 0.04.
+    let (level, ..) = of(json!({ "specularTexture": { "index": 0 } }));
+    assert!(near(&level, &[0.016; 3]), "{level:?}");
+    let (both, _, notes) =
+        of(json!({ "specularTexture": { "index": 0 }, "specularColorTexture": { "index": 0 } }));
+    assert!(near(&both, &[0.016 * 0.2159, 0.016 * 0.0331, 0.0]), "{both:?}");
+    assert!(notes.is_empty(), "{notes:?}");
+    let apart =
+        json!({ "specularTexture": { "index": 0, "texCoord": 1 }, "specularColorTexture": { "index": 0 } });
+    let (color, _, notes) = of(apart);
+    assert!(near(&color, &[0.04 * 0.2159, 0.04 * 0.0331, 0.0]), "{color:?}");
+    assert!(notes.iter().any(|note| note.contains("`specularTexture` left out")), "{notes:?}");
+}
+
+#[test]
+fn clear_coats_blend_roughness_by_their_textures() {
+    let of = |more: Value| {
+        let mut coat_of = json!({ "clearcoatFactor": 1, "clearcoatRoughnessFactor": 0.25 });
+        coat_of.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        coat(json!({ "KHR_materials_clearcoat": coat_of })).1
+    };
+    assert!(near(&[of(json!({}))], &[0.25]));
+    assert!(near(&[of(json!({ "clearcoatFactor": 0.5 }))], &[0.375]));
+    // Red 0.502 is the weight; green 0.2 a factor on the roughness of the coat.
+    assert!(near(&[of(json!({ "clearcoatTexture": { "index": 0 } }))], &[0.5 - 0.50196 * 0.25]));
+    let both = json!({ "clearcoatTexture": { "index": 0 }, "clearcoatRoughnessTexture": { "index": 0 } });
+    assert!(near(&[of(both)], &[0.5 - 0.50196 * 0.45]));
 }
