@@ -28,22 +28,25 @@ impl Grid {
     }
 
     /// Makes unknown cells known in at most `rings` rings around the known ones: `take(cell, from)` is called
-    /// for each, with the known neighbours of which `may_take(cell, neighbour)` holds.
+    /// for each, with the known neighbours of which `may_take(cell, neighbour)` holds. Cells stay unknown from
+    /// when `watch` returns false.
     pub(super) fn fill(
         self,
         is_known: &mut [bool],
         rings: usize,
         may_take: impl Fn(usize, usize) -> bool,
         mut take: impl FnMut(usize, &[usize]),
+        watch: &dyn Fn() -> bool,
     ) {
         let may_take = &may_take;
         let is_source =
             |is_known: &[bool], cell: usize, other: usize| is_known[other] && may_take(cell, other);
         let has_source = |cell: usize| self.neighbours(cell).any(|other| is_source(is_known, cell, other));
-        let mut ring: Vec<usize> =
-            (0..self.len()).filter(|&cell| !is_known[cell] && has_source(cell)).collect();
+        let rows = (0..self.len()).step_by(self.0[0].max(1)).take_while(|_| watch());
+        let cells = rows.flat_map(|first| first..first + self.0[0]);
+        let mut ring: Vec<usize> = cells.filter(|&cell| !is_known[cell] && has_source(cell)).collect();
         let mut sources = Vec::new();
-        for _ in 0..rings {
+        for _ in (0..rings).take_while(|_| watch()) {
             for &cell in &ring {
                 sources.clear();
                 sources.extend(self.neighbours(cell).filter(|&other| is_source(is_known, cell, other)));
@@ -72,7 +75,8 @@ mod tests {
         let mut values: Vec<char> = cells.chars().collect();
         let mut is_known: Vec<bool> = values.iter().map(|value| *value != '.').collect();
         let grid = Grid([values.len(), 1, 1]);
-        grid.fill(&mut is_known, rings, may_take, |cell, from| values[cell] = values[from[0]]);
+        let take = |cell: usize, from: &[usize]| values[cell] = values[from[0]];
+        grid.fill(&mut is_known, rings, may_take, take, &|| true);
         values.into_iter().collect()
     }
 

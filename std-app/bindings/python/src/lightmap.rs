@@ -44,7 +44,7 @@ pub(crate) fn lightmap<'py>(
     let views = loaded.views();
     let mut budget = bake::budget(&views.scene(loaded.camera_or_default()), renderer.memory);
     let before = budget.left();
-    let texels = py.detach(|| bake::Lightmap::new(loaded, settings, &mut budget));
+    let texels = py.detach(|| bake::Lightmap::new(loaded, settings, &mut budget, &mut |_| true));
     let texels = texels.map_err(|error| invalid(py, &format!("{error}\n  help: {}", error.advice())))?;
     let left = budget.limit() + budget.left() - before;
     let settings = keywords.settings(py, Some(left))?;
@@ -54,7 +54,7 @@ pub(crate) fn lightmap<'py>(
     })?;
     let baked = baked.map_err(|error| raised(py, error))?;
     let lightmap = Lightmap {
-        map: py.detach(|| texels.map(&baked, Quantity::Irradiance)),
+        map: py.detach(|| texels.map(&baked, Quantity::Irradiance, &|| true)),
         charts: texels.charts(),
         notes: texels.notes,
         seconds: baked.seconds[1],

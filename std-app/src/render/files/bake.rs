@@ -15,7 +15,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLBAKE", version: 2, name: "bake" };
+const KIND: Kind = Kind { magic: *b"HLBAKE", version: 3, name: "bake" };
 
 /// Most points, by their memory in a film.
 const MOST_POINTS: usize = 1 << 30;
