@@ -37,6 +37,9 @@ const LIES_ON: f32 = 4.0;
 /// Bound of the rounding of a coordinate that a few operations have computed, relative to the coordinate.
 const POINT_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
+/// Longest way off a border in margins: needles are thinner than their margins.
+const MOST_STEP: f32 = 16.0;
+
 /// Light of which the irradiance is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightPart {
@@ -111,18 +114,18 @@ impl IrradiancePoint {
     }
 
     /// A free point that lies on a surface within rounding is put on it, on the side of its normal: sensors
-    /// at height 0 of a floor are above the floor. A point of a surface at the foot of a wall is put in front
-    /// of the wall by its rounding. Other points stay.
+    /// at height 0 of a floor are above the floor. A point on the border of a triangle is put inside by its
+    /// rounding. Other points stay.
     #[doc(hidden)]
     pub fn settled<F: Features>(self, context: &SceneContext<F>) -> Self {
         let point = if self.triangle == MISS { self.on_surface(context) } else { self };
-        if point.triangle == MISS { point } else { point.off_walls(context) }
+        if point.triangle == MISS { point } else { point.off_border(context.scene) }
     }
 
-    /// A point of a triangle whose border is the foot of a wall, in front of it: rays of the very border
-    /// begin in the plane of the wall and pass it by.
-    fn off_walls<F: Features>(self, context: &SceneContext<F>) -> Self {
-        let corners = context.scene.mesh.corners(self.triangle);
+    /// A point of a triangle, off its border, which may be the foot of a wall: rays of the very border begin
+    /// in the plane of the wall and pass it by.
+    fn off_border(self, scene: &Scene) -> Self {
+        let corners = scene.mesh.corners(self.triangle);
         let (position, middle) = (Vec3::from(self.position), corners.iter().sum::<Vec3>() / 3.0);
         let margin = LIES_ON * (self.error + POINT_ROUNDING * position.abs().max_element());
         // Part of the distance to the middle, which is as far from each edge as a third of its height.
@@ -134,12 +137,8 @@ impl IrradiancePoint {
             missing / (full / 3.0 - distance).max(missing).max(f32::MIN_POSITIVE)
         };
         let step = part(0).max(part(1)).max(part(2)) * (middle - position);
-        let Some(direction) = step.try_normalize() else { return self };
-        let inside = position + step;
-        // Across the border, above the surface.
-        let origin = inside + self.error * Vec3::from(self.geometric_normal);
-        let has_wall = context.nearest(&Ray::segment(origin, -direction, 2.0 * step.length())).is_some();
-        if has_wall { Self { position: inside.to_array(), ..self } } else { self }
+        let inside = position + step.clamp_length_max(MOST_STEP * margin);
+        if inside.is_finite() { Self { position: inside.to_array(), ..self } } else { self }
     }
 
     /// The point on a surface that it lies on within rounding, or as it is.
