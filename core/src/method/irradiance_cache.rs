@@ -5,6 +5,7 @@
 //! difference of the halves of the film shows the errors of records too. First both caches are filled, then
 //! they are frozen. Paths go on where no record is valid.
 
+mod part;
 mod settings;
 
 pub use settings::CacheSettings;
@@ -27,8 +28,7 @@ use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
 pub const LEAST_PIXELS: f32 = 2.0;
 
 /// The fraction of the time that is left before both caches are filled in which each is to be filled: both
-/// are cut alike. Points that no record reaches by then are path traced. A smaller fraction leaves more to
-/// paths where filling is slow (docs/decisions/cache-time.md#deadline).
+/// are cut alike, and other points are path traced (docs/decisions/cache-time.md#deadline).
 const TIME: f32 = 0.18;
 
 /// The same for the view-bound records of both halves, of the time that is left then.
