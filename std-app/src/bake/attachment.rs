@@ -53,7 +53,8 @@ impl Lightmap {
     pub fn attachment(&self, quantity: Quantity) -> Vec<u8> {
         let Self { settings, charts, texels, seams, .. } = self;
         let head = SubjectHead::Lightmap(settings.clone(), [self.chart_count, seams.len()]);
-        let numbers = [bytemuck::cast_slice(charts), bytemuck::cast_slice(texels), bytemuck::cast_slice(seams)];
+        let numbers =
+            [bytemuck::cast_slice(charts), bytemuck::cast_slice(texels), bytemuck::cast_slice(seams)];
         bytes_of(quantity, head, &numbers)
     }
 }

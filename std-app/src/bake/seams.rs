@@ -25,7 +25,10 @@ impl Seam {
     /// True if both sides are on a map of `size` texels, but for a texel of rounding.
     pub(super) fn is_on(&self, size: [u32; 2]) -> bool {
         let most = DVec2::from(size.map(f64::from)) + 1.0;
-        self.sides.as_flattened().iter().all(|end| DVec2::from(*end).clamp(-DVec2::ONE, most) == DVec2::from(*end))
+        self.sides
+            .as_flattened()
+            .iter()
+            .all(|end| DVec2::from(*end).clamp(-DVec2::ONE, most) == DVec2::from(*end))
     }
 
     /// Longer side in texels.

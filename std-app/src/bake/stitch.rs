@@ -97,7 +97,9 @@ impl Differences {
         };
         let stay: Vec<f64> = texels.iter().map(stay).collect();
         let mut scale = stay.clone();
-        rows.iter().flatten().for_each(|(place, weight)| scale[*place as usize] += f64::from(weight * weight));
+        rows.iter()
+            .flatten()
+            .for_each(|(place, weight)| scale[*place as usize] += f64::from(weight * weight));
         scale.iter_mut().for_each(|scale| *scale = scale.recip());
         (!rows.is_empty()).then_some(Self { texels, rows, stay, scale })
     }
@@ -105,7 +107,8 @@ impl Differences {
     /// The changes of `values` that minimise the sum of the squares of differences and weighted changes.
     fn solve(&self, values: &[f64], changes: &mut [f64], watch: &dyn Fn() -> bool) {
         let count = values.len();
-        let (mut residual, mut product, mut direction) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+        let (mut residual, mut product, mut direction) =
+            (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
         changes.fill(0.0);
         self.add_squares(values, &mut residual);
         residual.iter_mut().for_each(|residual| *residual = -*residual);

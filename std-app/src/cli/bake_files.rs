@@ -122,7 +122,7 @@ impl MapFiles {
         let (charts, computed, filled) =
             (lightmap.charts(), map.count(Texel::Computed), lightmap.filled(&map));
         let padded = map.count(Texel::Filled) - filled;
-        let texels = json!({ "computed": computed, "filled": filled, "padded": padded });
+        let texels = json!({ "computed": computed, "filled": filled, "padded": padded, "open": unfilled });
         Saved {
             text: format!("{charts} charts, {computed} texels computed and {filled} filled; "),
             entries: vec![("charts", charts.into()), ("texels", texels)],
