@@ -92,6 +92,18 @@ mod tests {
     }
 
     #[test]
+    fn a_watch_ends_the_filling() {
+        let (mut is_known, calls) = ([true, false, false, false], core::cell::Cell::new(0));
+        let watch = || {
+            calls.set(calls.get() + 1);
+            calls.get() <= 2
+        };
+        // The one row and the first ring are allowed.
+        Grid([4, 1, 1]).fill(&mut is_known, usize::MAX, |_, _| true, |_, _| (), &watch);
+        assert_eq!(is_known, [true, true, false, false]);
+    }
+
+    #[test]
     fn neighbours_touch_in_all_axes() {
         let grid = Grid([3, 4, 5]);
         assert_eq!(grid.neighbours(0).count(), 7);
