@@ -114,31 +114,47 @@ impl IrradiancePoint {
     }
 
     /// A free point that lies on a surface within rounding is put on it, on the side of its normal: sensors
-    /// at height 0 of a floor are above the floor. A point on the border of a triangle is put inside by its
-    /// rounding. Other points stay.
+    /// at height 0 of a floor are above the floor. A point of a surface at the foot of a wall is put in front
+    /// of the wall by its rounding. Other points stay.
     #[doc(hidden)]
     pub fn settled<F: Features>(self, context: &SceneContext<F>) -> Self {
         let point = if self.triangle == MISS { self.on_surface(context) } else { self };
-        if point.triangle == MISS { point } else { point.off_border(context.scene) }
+        if point.triangle == MISS { point } else { point.off_walls(context) }
     }
 
-    /// A point of a triangle, off its border, which may be the foot of a wall: rays of the very border begin
-    /// in the plane of the wall and pass it by.
-    fn off_border(self, scene: &Scene) -> Self {
-        let corners = scene.mesh.corners(self.triangle);
+    /// A point of a triangle whose border is the foot of a wall, in front of it: rays of the very border
+    /// begin in the plane of the wall and pass it by.
+    fn off_walls<F: Features>(self, context: &SceneContext<F>) -> Self {
+        let corners = context.scene.mesh.corners(self.triangle);
         let (position, middle) = (Vec3::from(self.position), corners.iter().sum::<Vec3>() / 3.0);
         let margin = LIES_ON * (self.error + POINT_ROUNDING * position.abs().max_element());
-        // Part of the distance to the middle, which is as far from each edge as a third of its height.
-        let part = |i: usize| {
+        // Part of the distance to the middle, which is as far from each edge as a third of its height; the
+        // directions along the edge and from it.
+        let edges = [0, 1, 2].map(|i| {
             let (a, along) = (corners[i], corners[(i + 1) % 3] - corners[i]);
             let height = (corners[(i + 2) % 3] - a).reject_from(along);
-            let (full, distance) = (height.length(), (position - a).dot(height.normalize_or_zero()));
+            let (full, inward) = (height.length(), height.normalize_or_zero());
+            let distance = (position - a).dot(inward);
             let missing = (margin - distance).max(0.0);
-            missing / (full / 3.0 - distance).max(missing).max(f32::MIN_POSITIVE)
+            let part = missing / (full / 3.0 - distance).max(missing).max(f32::MIN_POSITIVE);
+            (part, along.normalize_or_zero(), inward)
+        });
+        let part = edges.iter().fold(0f32, |most, (part, ..)| most.max(*part));
+        let step = (part * (middle - position)).clamp_length_max(MOST_STEP * margin);
+        let Some(direction) = step.try_normalize() else { return self };
+        let (inside, length) = (position + step, step.length());
+        // Across the border, above the surface.
+        let above = self.error * Vec3::from(self.geometric_normal);
+        let meets = |from: Vec3, direction: Vec3| {
+            context.nearest(&Ray::segment(from + above, direction, 2.0 * length)).is_some()
         };
-        let step = part(0).max(part(1)).max(part(2)) * (middle - position);
-        let inside = position + step.clamp_length_max(MOST_STEP * margin);
-        if inside.is_finite() { Self { position: inside.to_array(), ..self } } else { self }
+        // A wall may end at the point: rays on both sides of it as well.
+        let beside = |(part, along, inward): &(f32, Vec3, Vec3)| {
+            let from = position + length * *inward;
+            *part > 0.0 && [-length, length].into_iter().any(|side| meets(from + side * *along, -*inward))
+        };
+        let has_wall = meets(inside, -direction) || edges.iter().any(beside);
+        if has_wall { Self { position: inside.to_array(), ..self } } else { self }
     }
 
     /// The point on a surface that it lies on within rounding, or as it is.
