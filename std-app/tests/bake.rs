@@ -1,11 +1,14 @@
 //! Irradiance at points by the program and by the library.
 
+use crate::lightmaps::{folder, furnace};
 use crate::support::Folder;
 use core::sync::atomic::AtomicBool;
+use core::sync::atomic::Ordering::Relaxed;
 use halflight::Renderer;
-use halflight::bake::{BakeSettings, Sensor, irradiance};
+use halflight::bake::{BakeProgress, BakeSettings, Sensor, irradiance};
 use halflight::load::{LoadOptions, load};
-use halflight::render::Stop;
+use halflight::render::{Checkpoint, Stop};
+use halflight_core::PointMethod;
 use std::io::Write;
 use std::process::Stdio;
 
@@ -271,6 +274,79 @@ fn a_cache_is_chosen_where_it_is_predicted_to_have_less_error() {
     let object = folder.object(&format!("{bake} --error 0.02 -o many.csv"));
     assert_eq!(object["findings"]["irradiance_cache"]["decision"], "used", "{object}");
     assert_eq!(object["tiles"], object["within_error"], "{object}");
-    let said = folder.refused(&format!("{bake} --spp 4 --checkpoint a.bake"));
-    assert!(said.contains("--checkpoint"), "{said}");
+    let said = folder.refused(&format!("{bake} --spp 4 --shard 1/2 --checkpoint a.bake"));
+    assert!(said.contains("a shard has no irradiance cache"), "{said}");
+}
+
+#[test]
+fn vertices_at_the_free_end_of_a_wall_have_one_value_in_all_directions() {
+    // A floor, a wall along half of its side, and a lamp behind the wall. The vertex at the end of the wall
+    // is on the fan of the floor.
+    let places = [
+        [1.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [2.0, 0.0, 2.0],
+        [0.0, 0.0, 2.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 2.0, 0.0],
+        [1.0, 2.0, 0.0],
+        [-5.0, 0.0, -3.0],
+        [7.0, 0.0, -3.0],
+        [7.0, 5.0, -3.0],
+        [-5.0, 5.0, -3.0],
+    ];
+    let faces = "usemtl black\nf 1 3 2\nf 1 4 3\nf 5 4 1\nf 5 1 7 6\nusemtl lamp\nf 8 9 10 11\n";
+    let materials = "newmtl black\nKd 0 0 0\nnewmtl lamp\nKd 0 0 0\nKe 1 1 1\n";
+    let values = (0..6).map(|number| {
+        let (sin, cos) = (0.3 + 0.7 * f64::from(number)).sin_cos();
+        let turned = |[x, y, z]: [f64; 3]| [x * cos - z * sin + 3.7, y + 0.9, x * sin + z * cos - 1.3];
+        let vertices = places.map(turned).map(|[x, y, z]| format!("v {x} {y} {z}\n")).concat();
+        let folder = folder(&format!("bake-free-end-{number}"), &format!("{vertices}{faces}"), materials);
+        folder.object("bake scene.obj --vertices --spp 64 -o vertices.csv --json");
+        let rows = rows(&std::fs::read(folder.path("vertices.csv")).unwrap());
+        let [x, y, z] = turned(places[0]);
+        let is_at_end = |row: &Vec<f64>| {
+            let near = [row[0] - x, row[1] - y, row[2] - z].iter().all(|part| part.abs() < 1e-4);
+            near && row[4] > 0.5
+        };
+        rows.iter().find(|row| is_at_end(row)).unwrap()[9]
+    });
+    let values: Vec<f64> = values.collect();
+    let mean = values.iter().sum::<f64>() / 6.0;
+    // One of them was a quarter of the others.
+    assert!(mean > 0.1 && values.iter().all(|value| (value / mean - 1.0).abs() < 0.05), "{values:?}");
+}
+
+#[test]
+fn an_interrupted_bake_with_a_cache_goes_on_to_the_bits_of_one() {
+    let folder = furnace("bake-cache-parts");
+    let loaded = load(&folder.path("scene.obj"), &LoadOptions::default()).unwrap();
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    let place = |i: u32| [0, 1].map(|axis| 1.8 * ((f64::from(i) * [0.7548, 0.5698][axis]).fract() - 0.5));
+    let sensors =
+        (0..600).map(place).map(|[x, z]| Sensor { position: [x, -1.0, z], normal: [0.0, 1.0, 0.0] });
+    let points: Vec<_> = sensors.map(|sensor| sensor.point(&loaded)).collect();
+    let settings = BakeSettings {
+        stop: Stop { spp: Some(96), ..Stop::default() },
+        method: PointMethod::IrradianceCache,
+        threads: Some(2),
+        ..BakeSettings::default()
+    };
+    let bake = |settings: &BakeSettings, most: u32| {
+        let interrupt = AtomicBool::new(false);
+        let mut progress = |progress: &BakeProgress| interrupt.store(progress.samples >= most, Relaxed);
+        irradiance(&scene, &points, settings, &mut progress, &interrupt).unwrap()
+    };
+    let whole = bake(&settings, u32::MAX);
+    let file = folder.path("a.bake");
+    let checkpoint = Some(Checkpoint { path: file.clone(), every: 1e9 });
+    let first = bake(&BakeSettings { checkpoint, ..settings.clone() }, 8);
+    assert!(first.is_interrupted && first.values[0].samples < 96);
+    let second = bake(&BakeSettings { resume: Some(file), threads: Some(1), ..settings }, u32::MAX);
+    assert_eq!(second.values, whole.values);
+    let cache = whole.findings.get("irradiance_cache").and_then(|finding| finding.number("records"));
+    assert!(
+        cache.is_some_and(|records| records > 0.0) && whole.values.iter().all(|value| value.samples == 96)
+    );
 }

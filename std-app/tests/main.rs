@@ -26,5 +26,6 @@ mod probes;
 mod process;
 mod reconstruction;
 mod renderer;
+mod seams;
 mod sky;
 mod support;

@@ -77,7 +77,7 @@ fn write_light(loaded: &LoadedScene, folder: &Path) {
     let size = [160, 120];
     let settings = LightmapSettings { subject: None, size, points: 1, padding: 4, directional: false };
     let lightmap = Lightmap::new(loaded, settings, &mut budget, &mut |_| true).unwrap();
-    let map = lightmap.map(&bake(loaded, lightmap.points(), 128), Quantity::Irradiance);
+    let map = lightmap.map(&bake(loaded, lightmap.points(), 128), Quantity::Irradiance, &|| true);
     std::fs::write(folder.join("map.exr"), map.encode(Format::Exr).unwrap()).unwrap();
     let settings = ProbeSettings { size: [6; 3], bounds: None, cubes: false };
     let grid = ProbeGrid::new(loaded, settings, &mut budget).unwrap();

@@ -31,6 +31,13 @@ const AUDIT: f64 = 0.2;
 const FILLING_OF_GAIN: f64 = 0.05;
 const MOST_FILLING: f64 = 0.5;
 
+/// Part of the tiles whose records are placed first, and their fewest and most, by which those of all are
+/// predicted. And the part of them that is certain: tiles of their own need records around them that they
+/// could share.
+const PILOT_PART: usize = 16;
+const PILOT: [usize; 2] = [2, 8];
+const CERTAIN: f64 = 0.5;
+
 const SETTINGS: CacheSettings = CacheSettings {
     metric: Metric::Halflight,
     error: CacheResolution::COARSEST.error,
@@ -157,6 +164,12 @@ pub struct CachedPoints<'a, F> {
     caching: IrradianceCaching<'a, F>,
     /// True if its size follows from the work.
     is_limited: bool,
+    /// Tiles of the pilot and of the film, until the records of the pilot are placed.
+    pilot: Option<(PointPlaces<'a>, [usize; 2])>,
+    /// Records that pay.
+    most: f64,
+    /// Predicted records of one cache.
+    predicted: Option<f64>,
 }
 
 impl<'a, F: Features> CachedPoints<'a, F> {
@@ -188,12 +201,24 @@ impl<'a, F: Features> CachedPoints<'a, F> {
         let records = is_limited.then(|| prediction.records.clamp(1.0, usual) as u32);
         let settings = CacheSettings { picture: Some(prediction.picture), records, ..SETTINGS };
         let caching = IrradianceCaching::new(context, &settings, memory)?;
-        Ok(Some(Self { caching: caching.for_points(PointPlaces::new(points, step)), is_limited }))
+        let places = PointPlaces::new(points, step);
+        let tiles = (places.tiles() / PILOT_PART).clamp(PILOT[0], PILOT[1]);
+        // Few tiles are their own pilot.
+        let has_pilot = is_limited && places.tiles() >= PILOT_PART;
+        let pilot = has_pilot.then(|| (places.of_tiles(tiles), [tiles, places.tiles()]));
+        let (most, predicted) = (prediction.records, None);
+        Ok(Some(Self { caching: caching.for_points(places), is_limited, pilot, most, predicted }))
     }
 
     /// True if the scene needs more records than pay.
     pub fn is_too_small(&self) -> bool {
-        self.is_limited && self.caching.caches().iter().any(|cache| cache.is_full())
+        let is_predicted = self.predicted.is_some_and(|records| CERTAIN * records > self.most);
+        self.is_limited && (is_predicted || self.caching.caches().iter().any(|cache| cache.is_full()))
+    }
+
+    /// True if there was no time for all of its records.
+    pub fn is_cut(&self) -> bool {
+        self.caching.is_cut()
     }
 
     /// Fills both caches, or continues to, unless they are too small. Returns whether they are complete.
@@ -202,6 +227,18 @@ impl<'a, F: Features> CachedPoints<'a, F> {
     /// [`OutOfMemory`] where the scratch of the executor is too small.
     pub fn fill<E: Executor>(&mut self, round: &mut Round<E>) -> Result<bool, OutOfMemory> {
         if !self.caching.is_frozen() {
+            if let Some((places, [tiles, all])) = self.pilot {
+                let of_all = all as f64 / tiles as f64;
+                let most = (self.most / (CERTAIN * of_all)) as usize + 1;
+                if !self.caching.fill_part((places, most), round)? {
+                    return Ok(false);
+                }
+                let records = self.caching.caches()[0].records().len();
+                (self.pilot, self.predicted) = (None, Some(of_all * records as f64));
+                if self.is_too_small() {
+                    return Ok(false);
+                }
+            }
             for number in 0..FILLED {
                 if !self.caching.fill(number, None, round)? || self.is_too_small() {
                     return Ok(false);
@@ -233,6 +270,7 @@ impl<'a, F: Features> CachedPoints<'a, F> {
             .with("error", Value::Number(resolution.error.into()))
             .with("rays_per_record", Value::Count(resolution.strata.pow(2).into()))
             .with("records", Value::Count(records))
+            .with_some("predicted_records", self.predicted.map(|records| Value::Count(2 * records as u64)))
             .with_count("refused", refused)
     }
 }

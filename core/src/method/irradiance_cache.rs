@@ -5,6 +5,7 @@
 //! difference of the halves of the film shows the errors of records too. First both caches are filled, then
 //! they are frozen. Paths go on where no record is valid.
 
+mod part;
 mod settings;
 
 pub use settings::CacheSettings;

@@ -150,6 +150,11 @@ impl<'a, F: Features> IrradiancePoints<'a, F> {
         self.prediction.map(|prediction| prediction.limits)
     }
 
+    /// True if a cache serves the indirect light, and true if there was no time for all of its records.
+    pub fn source(&self) -> (bool, bool) {
+        (self.cache.is_some(), self.cache.as_ref().is_some_and(CachedPoints::is_cut))
+    }
+
     /// Path traces all points from now on, since records have too much error.
     pub fn leave_cache(&mut self) {
         (self.cache, self.without_cache) = (None, Some("records have more error than paths"));

@@ -182,16 +182,10 @@ impl<'a> IrradianceRenderer<'a> {
     /// [`RenderError::Memory`] where the scratch of `executor` is too small.
     pub fn step(&mut self, executor: &mut impl Executor, until: Until) -> Result<(), RenderError> {
         match until {
-            Until::Samples(target) => {
-                self.sample(executor, target, |_, _| true)?;
-                if self.estimate(executor, target) {
-                    self.sample(executor, target, |_, _| true)?;
-                    self.estimate(executor, target);
-                }
-                Ok(())
-            }
-            Until::Error(error) => self.step_within(executor, error, MOST_SAMPLES),
+            Until::Samples(target) => self.advance((None, target), executor)?,
+            Until::Error(error) => self.advance((Some(error), MOST_SAMPLES), executor)?,
         }
+        Ok(())
     }
 
     /// As [`Until::Error`], with at most so many samples of each point.
@@ -204,12 +198,7 @@ impl<'a> IrradianceRenderer<'a> {
         error: f64,
         most: u32,
     ) -> Result<(), RenderError> {
-        self.sample_within((error, most), executor)?;
-        if self.estimate(executor, most) {
-            self.sample_within((error, most), executor)?;
-            self.estimate(executor, most);
-        }
-        Ok(())
+        Ok(self.advance((Some(error), most), executor)?)
     }
 
     /// Irradiance of each point, in the order of the points.
@@ -245,6 +234,12 @@ impl<'a> IrradianceRenderer<'a> {
         (self.decision, self.error, self.finished)
     }
 
+    /// True if a cache serves the indirect light, and true if there was no time for all of its records.
+    #[doc(hidden)]
+    pub fn source(&self) -> (bool, bool) {
+        of_build!(&self.build, method => method.source())
+    }
+
     /// Continues an earlier run: its decisions, and the sums that `fill` puts into the film.
     ///
     /// # Errors
@@ -274,24 +269,21 @@ impl<'a> IrradianceRenderer<'a> {
         counters
     }
 
-    /// Estimates the intervals after `samples` of each point. Returns whether an audit has found too much
-    /// bias for the cache: the film is then empty, and paths are to fill it.
-    fn estimate(&mut self, executor: &mut impl Executor, samples: u32) -> bool {
-        let Some(audit) = &self.audit else {
-            self.film.estimate(executor, 0.0);
-            return false;
-        };
-        let bias = audit.bias(&self.film).unwrap_or(Bias { lower: 0.0, upper: f64::INFINITY });
+    /// Bias of the cache; 0 without one.
+    fn bias(&self) -> Bias {
+        let unknown = Bias { lower: 0.0, upper: f64::INFINITY };
+        self.audit.as_ref().map_or(Bias::default(), |audit| audit.bias(&self.film).unwrap_or(unknown))
+    }
+
+    /// Estimates the intervals.
+    fn estimate(&mut self, executor: &mut impl Executor) {
+        self.film.estimate(executor, self.bias().upper as f32);
+    }
+
+    /// True if an audit after `samples` of each point has found too much bias for the cache.
+    fn is_cache_useless(&self, samples: u32) -> bool {
         let most = of_build!(&self.build, method => method.limits_of_cache());
-        let is_useless = most.is_some_and(|most| {
-            bias.lower > most.bias || samples != MOST_SAMPLES && f64::from(samples) > most.samples
-        });
-        if samples >= FIRST_DECISION && is_useless && !executor.is_over() {
-            self.leave_cache();
-            return true;
-        }
-        self.film.estimate(executor, bias.upper as f32);
-        false
+        most.is_some_and(|most| self.bias().lower > most.bias || f64::from(samples) > most.samples)
     }
 
     /// Begins again by path tracing.

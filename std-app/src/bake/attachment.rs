@@ -5,6 +5,7 @@ use super::lightmap::{Lightmap, LightmapSettings};
 use super::points::Sensor;
 use super::probes::{ProbeGrid, ProbeSettings};
 use super::raster::EMPTY;
+use super::seams::Seam;
 use super::table::Quantity;
 use crate::save::MAX_PIXELS;
 use halflight_core::{IrradiancePoint, LightProbe};
@@ -32,8 +33,8 @@ struct Head {
 enum SubjectHead {
     /// Six coordinates of each sensor follow.
     Sensors,
-    /// The number of charts; charts of all texels, and texels of all points, follow.
-    Lightmap(LightmapSettings, usize),
+    /// The numbers of charts and of seams; charts of all texels, texels of all points, and seams follow.
+    Lightmap(LightmapSettings, [usize; 2]),
     /// Numbers of probes along the axes, and whether there are cubes; both corners of the box follow.
     Probes([u32; 3], bool),
 }
@@ -50,8 +51,11 @@ pub fn attachment(sensors: &[Sensor], quantity: Quantity) -> Vec<u8> {
 impl Lightmap {
     /// The bytes of a bake of its points, for [`crate::bake::BakeSettings::attached`].
     pub fn attachment(&self, quantity: Quantity) -> Vec<u8> {
-        let head = SubjectHead::Lightmap(self.settings.clone(), self.chart_count);
-        bytes_of(quantity, head, &[bytemuck::cast_slice(&self.charts), bytemuck::cast_slice(&self.texels)])
+        let Self { settings, charts, texels, seams, .. } = self;
+        let head = SubjectHead::Lightmap(settings.clone(), [self.chart_count, seams.len()]);
+        let numbers =
+            [bytemuck::cast_slice(charts), bytemuck::cast_slice(texels), bytemuck::cast_slice(seams)];
+        bytes_of(quantity, head, &numbers)
     }
 }
 
@@ -77,8 +81,8 @@ pub(super) fn subject_of(attached: &[u8], points: Vec<IrradiancePoint>) -> Optio
     let numbers = &attached[end + 1..];
     let subject = match subject {
         SubjectHead::Sensors => BakeSubject::Sensors(sensors(numbers, points.len())?),
-        SubjectHead::Lightmap(settings, count) => {
-            BakeSubject::Lightmap(lightmap(settings, count, numbers, points)?)
+        SubjectHead::Lightmap(settings, counts) => {
+            BakeSubject::Lightmap(lightmap(settings, counts, numbers, points)?)
         }
         SubjectHead::Probes(size, cubes) => {
             BakeSubject::Probes(probes((size, cubes), numbers, points.len())?)
@@ -95,10 +99,13 @@ fn sensors(numbers: &[u8], count: usize) -> Option<Vec<Sensor>> {
 
 fn lightmap(
     settings: LightmapSettings,
-    chart_count: usize,
+    [chart_count, seam_count]: [usize; 2],
     numbers: &[u8],
     points: Vec<IrradiancePoint>,
 ) -> Option<Lightmap> {
+    let of_seams = numbers.len().checked_sub(seam_count.checked_mul(size_of::<Seam>())?)?;
+    let (numbers, of_seams) = numbers.split_at(of_seams);
+    let seams: Vec<Seam> = numbers_of(of_seams)?;
     let mut charts: Vec<u32> = numbers_of(numbers)?;
     let count = settings.size.iter().try_fold(1usize, |count, side| count.checked_mul(*side as usize))?;
     let is_small = (1..=MAX_PIXELS / settings.layers()).contains(&count);
@@ -107,8 +114,9 @@ fn lightmap(
     let is_whole = texels.len() * settings.layers() == points.len()
         && texels.iter().all(has_chart)
         && charts.iter().all(|chart| *chart == EMPTY || (*chart as usize) < chart_count)
-        && chart_count <= count;
-    is_whole.then(|| Lightmap { settings, charts, chart_count, points, texels, notes: Vec::new() })
+        && chart_count <= count
+        && seams.iter().all(|seam| seam.is_on(settings.size));
+    is_whole.then(|| Lightmap { settings, charts, chart_count, points, texels, seams, notes: Vec::new() })
 }
 
 fn probes((size, cubes): ([u32; 3], bool), numbers: &[u8], points: usize) -> Option<ProbeGrid> {
@@ -151,20 +159,22 @@ mod tests {
     }
 
     #[test]
-    fn texels_without_a_chart_are_refused() {
+    fn texels_without_a_chart_and_seams_outside_are_refused() {
         let settings =
             LightmapSettings { subject: None, size: [2, 1], points: 1, padding: 0, directional: false };
         let points = vec![IrradiancePoint::default(); 1];
-        let of = |texel: u32| {
+        let of = |texel: u32, far: f64| {
             let (charts, texels) = (vec![EMPTY, 0], vec![texel]);
             let (settings, points) = (settings.clone(), points.clone());
-            let map = Lightmap { settings, charts, chart_count: 1, points, texels, notes: Vec::new() };
+            let seams = vec![Seam { sides: [[[0.0; 2], [0.5, far]]; 2] }];
+            let map = Lightmap { settings, charts, chart_count: 1, points, texels, seams, notes: Vec::new() };
             map.attachment(Quantity::White)
         };
         assert!(matches!(
-            subject_of(&of(1), points.clone()),
+            subject_of(&of(1, 1.0), points.clone()),
             Some((BakeSubject::Lightmap(_), Quantity::White))
         ));
-        assert!([0, 2].iter().all(|texel| subject_of(&of(*texel), points.clone()).is_none()));
+        let others = [(0, 1.0), (2, 1.0), (1, f64::NAN), (1, 3.0)];
+        assert!(others.iter().all(|(texel, far)| subject_of(&of(*texel, *far), points.clone()).is_none()));
     }
 }

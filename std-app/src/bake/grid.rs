@@ -28,22 +28,25 @@ impl Grid {
     }
 
     /// Makes unknown cells known in at most `rings` rings around the known ones: `take(cell, from)` is called
-    /// for each, with the known neighbours of which `may_take(cell, neighbour)` holds.
+    /// for each, with the known neighbours of which `may_take(cell, neighbour)` holds. Cells stay unknown from
+    /// when `watch` returns false.
     pub(super) fn fill(
         self,
         is_known: &mut [bool],
         rings: usize,
         may_take: impl Fn(usize, usize) -> bool,
         mut take: impl FnMut(usize, &[usize]),
+        watch: &dyn Fn() -> bool,
     ) {
         let may_take = &may_take;
         let is_source =
             |is_known: &[bool], cell: usize, other: usize| is_known[other] && may_take(cell, other);
         let has_source = |cell: usize| self.neighbours(cell).any(|other| is_source(is_known, cell, other));
-        let mut ring: Vec<usize> =
-            (0..self.len()).filter(|&cell| !is_known[cell] && has_source(cell)).collect();
+        let rows = (0..self.len()).step_by(self.0[0].max(1)).take_while(|_| watch());
+        let cells = rows.flat_map(|first| first..first + self.0[0]);
+        let mut ring: Vec<usize> = cells.filter(|&cell| !is_known[cell] && has_source(cell)).collect();
         let mut sources = Vec::new();
-        for _ in 0..rings {
+        for _ in (0..rings).take_while(|_| watch()) {
             for &cell in &ring {
                 sources.clear();
                 sources.extend(self.neighbours(cell).filter(|&other| is_source(is_known, cell, other)));
@@ -72,7 +75,8 @@ mod tests {
         let mut values: Vec<char> = cells.chars().collect();
         let mut is_known: Vec<bool> = values.iter().map(|value| *value != '.').collect();
         let grid = Grid([values.len(), 1, 1]);
-        grid.fill(&mut is_known, rings, may_take, |cell, from| values[cell] = values[from[0]]);
+        let take = |cell: usize, from: &[usize]| values[cell] = values[from[0]];
+        grid.fill(&mut is_known, rings, may_take, take, &|| true);
         values.into_iter().collect()
     }
 
@@ -85,6 +89,18 @@ mod tests {
         // A border between the third and fourth cell.
         assert_eq!(filled("a....b", 99, |to, from| (to < 3) == (from < 3)), "aaabbb");
         assert_eq!(filled("a.....", 99, |to, from| (to < 3) == (from < 3)), "aaa...");
+    }
+
+    #[test]
+    fn a_watch_ends_the_filling() {
+        let (mut is_known, calls) = ([true, false, false, false], core::cell::Cell::new(0));
+        let watch = || {
+            calls.set(calls.get() + 1);
+            calls.get() <= 2
+        };
+        // The one row and the first ring are allowed.
+        Grid([4, 1, 1]).fill(&mut is_known, usize::MAX, |_, _| true, |_, _| (), &watch);
+        assert_eq!(is_known, [true, true, false, false]);
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! Lightmaps: points of the texels of charts, and maps of their irradiances. Texels inside bodies take the
-//! values of near ones of their chart, and those around charts the values of their neighbours.
+//! values of near ones of their chart, seams are stitched, and texels around charts take the values of their
+//! neighbours.
 
 use super::charts::{self, Charts, charts};
 use super::grid::Grid;
 use super::map::{Fetch, LightMap, Texel};
 use super::raster::{self, EMPTY, Raster, Watch, weights};
+use super::seams::{self, Seam, seams};
 use super::table::Quantity;
 use super::tilted::{linear, with_tilted};
 use crate::load::LoadedScene;
@@ -17,6 +19,9 @@ use glam::{DVec2, Vec3};
 use halflight_core::IrradiancePoint;
 use halflight_core::scene::{Scene, Triangle};
 use serde::{Deserialize, Serialize};
+
+/// Bytes of a triangle while charts and then seams are found.
+const BYTES_OF_TRIANGLE: usize = charts::BYTES_OF_TRIANGLE + seams::BYTES_OF_TRIANGLE;
 
 /// Fraction of back faces from which a point is inside a body, unless most points of the map are.
 const INSIDE: f32 = 0.5;
@@ -46,6 +51,7 @@ pub struct Lightmap {
     pub(super) points: Vec<IrradiancePoint>,
     /// Texel of each point, or of each four of them with four normals.
     pub(super) texels: Vec<u32>,
+    pub(super) seams: Vec<Seam>,
     /// Sentences on doubtful charts.
     pub notes: Vec<String>,
 }
@@ -123,7 +129,7 @@ impl Lightmap {
             return Err(LightmapError::Texels);
         }
         let bytes_of_texel = size_of::<u32>() + raster::BYTES_OF_TEXEL + LightMap::bytes_of_texel(layers);
-        let bytes = texels * bytes_of_texel + loaded.triangles.len() * charts::BYTES_OF_TRIANGLE;
+        let bytes = texels * bytes_of_texel + loaded.triangles.len() * BYTES_OF_TRIANGLE;
         budget.take(bytes).map_err(LightmapError::Memory)?;
         let is_chosen = chosen(loaded, settings.subject.as_deref())?;
         let of_scene = charts(loaded, is_chosen, settings.size).map_err(LightmapError::Charts)?;
@@ -147,7 +153,9 @@ impl Lightmap {
         budget.take(used * size_of::<u32>()).map_err(LightmapError::Memory)?;
         budget.has(used * layers * size_of::<IrradiancePoint>()).map_err(LightmapError::Memory)?;
         let (points, texels) = (Vec::with_capacity(used * layers), Vec::with_capacity(used));
-        let mut map = Self { settings, charts, chart_count: of_scene.count, points, texels, notes };
+        let views = loaded.views();
+        let seams = seams(&views.scene(loaded.camera_or_default()), loaded, &of_scene);
+        let mut map = Self { settings, charts, chart_count: of_scene.count, points, texels, seams, notes };
         map.place(loaded, &of_scene, &mut |number, done| of_pass(number + 1, done))
             .ok_or(LightmapError::Ended)?;
         Ok(map)
@@ -214,8 +222,15 @@ impl Lightmap {
         self.chart_count
     }
 
+    /// Number of chart texels without a value in `map`, since filling was ended.
+    pub fn unfilled(&self, map: &LightMap) -> usize {
+        let is_open = |(chart, texel): (&u32, &Texel)| *chart != EMPTY && *texel == Texel::Empty;
+        self.charts.iter().zip(&map.texels).filter(|pair| is_open(*pair)).count()
+    }
+
     /// The map of `baked` irradiances of the points. Without fractions of back faces all points are outside.
-    pub fn map(&self, baked: &Baked, quantity: Quantity) -> LightMap {
+    /// No more texels are filled, and no more seams stitched, when `watch` returns false.
+    pub fn map(&self, baked: &Baked, quantity: Quantity, watch: &dyn Fn() -> bool) -> LightMap {
         let layers = self.settings.layers();
         let mut map = LightMap::empty(self.settings.size, layers);
         let mut counts = vec![0u32; self.charts.len()];
@@ -237,20 +252,21 @@ impl Lightmap {
             counts[texel as usize] += 1;
         }
         map.divide(&counts, quantity.scale());
-        self.spread(&mut map, &counts);
+        self.spread(&mut map, &counts, watch);
         map
     }
 
-    /// Fills texels inside bodies, and those around charts.
-    fn spread(&self, map: &mut LightMap, counts: &[u32]) {
+    /// Fills texels inside bodies, stitches seams, and fills texels around charts.
+    fn spread(&self, map: &mut LightMap, counts: &[u32], watch: &dyn Fn() -> bool) {
         let [width, height] = self.settings.size.map(|side| side as usize);
         let grid = Grid([width, height, 1]);
         let mut is_known: Vec<bool> = counts.iter().map(|count| *count > 0).collect();
         let is_of_chart =
             |to: usize, from: usize| self.charts[to] != EMPTY && self.charts[to] == self.charts[from];
-        grid.fill(&mut is_known, usize::MAX, is_of_chart, |texel, from| map.take(texel, from));
+        grid.fill(&mut is_known, usize::MAX, is_of_chart, |texel, from| map.take(texel, from), watch);
+        map.stitch(&self.seams, &is_known, watch);
         let rings = self.settings.padding as usize;
-        grid.fill(&mut is_known, rings, |_, _| true, |texel, from| map.take(texel, from));
+        grid.fill(&mut is_known, rings, |_, _| true, |texel, from| map.take(texel, from), watch);
     }
 
     /// False for each bundle that is inside a body. Scenes whose walls show their backs are not inside one,

@@ -13,6 +13,8 @@ mod points;
 mod probe_files;
 mod probes;
 mod raster;
+mod seams;
+mod stitch;
 mod table;
 mod tilted;
 

@@ -122,7 +122,7 @@ impl ProbeGrid {
             let mean = mean(from.iter().map(|other| &probes[*other]));
             probes[cell] = Probe { back_faces, is_valid, ..mean };
         };
-        Grid(self.size()).fill(&mut is_known, usize::MAX, |_, _| true, take);
+        Grid(self.size()).fill(&mut is_known, usize::MAX, |_, _| true, take, &|| true);
         probes
     }
 

@@ -63,7 +63,7 @@ pub(super) struct Bake {
 
     /// Source of indirect light. A cache shares it among near points, and an audit adds its bias to the
     /// intervals; `auto` takes one where it is predicted to have less error
-    #[arg(long, default_value = "path", conflicts_with_all = ["kept", "resume", "shard"])]
+    #[arg(long, default_value = "path")]
     method: Method,
 
     /// Samples per point; fewer than 64 points have several independent estimates of so many samples
@@ -136,6 +136,10 @@ impl Bake {
 
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         self.progress.apply();
+        if self.parts.is_part() && !matches!(self.method, Method::Path) {
+            let why = "a shard has no irradiance cache: the audit that keeps or leaves it needs points of all shards";
+            return Err(Failure::new(why).advice("leave out --method, or --shard"));
+        }
         if let Some(run) = self.lightmap.run(self).or_else(|| self.probes.run(self)) {
             return run;
         }

@@ -1,15 +1,20 @@
 //! Files of tables, maps and probes, of `halflight bake` and `halflight merge`.
 
 use super::failure::Failure;
+use super::interrupt::INTERRUPT;
 use super::outputs::{Outputs, Role};
+use super::print_note;
 use core::fmt;
+use core::sync::atomic::Ordering;
+use core::time::Duration;
 use halflight::bake::{
     BakeSubject, Baked, Lightmap, MergedBake, ProbeFormat, ProbeGrid, Quantity, Sensor, TableFormat, Texel,
     check_format, write_probes, write_table,
 };
-use halflight::save::{FileError, Format};
+use halflight::save::{FileError, Format, Patience};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Numbers of charts and texels, or of probes, for text and JSON.
 pub(super) struct Saved {
@@ -70,6 +75,9 @@ fn formats<T>(
     paths.iter().map(format).collect()
 }
 
+/// Part of the time limit of a bake that filling and stitching may take after it.
+const FILLING: f64 = 0.1;
+
 /// Files of a lightmap.
 pub(super) struct MapFiles {
     maps: Vec<(PathBuf, Format)>,
@@ -87,13 +95,24 @@ impl MapFiles {
         self.error_map.iter().try_for_each(|(path, _)| outputs.plan(Role::ErrorMap, path))
     }
 
-    /// Writes the map of `baked` irradiances.
+    /// Writes the map of `baked` irradiances. Filling and stitching end some time after a signal, or after
+    /// the time limit of the bake.
     pub(super) fn save(
         &self,
         outputs: &mut Outputs,
         (lightmap, baked, quantity): (&Lightmap, &Baked, Quantity),
+        limit: Option<f64>,
     ) -> Saved {
-        let map = lightmap.map(baked, quantity);
+        let start = Instant::now();
+        let watch = || {
+            let is_ended = limit.is_some() || INTERRUPT.load(Ordering::Relaxed);
+            !is_ended || start.elapsed() < Patience::LEAST.max(limited(limit))
+        };
+        let map = lightmap.map(baked, quantity, &watch);
+        let unfilled = lightmap.unfilled(&map);
+        if unfilled > 0 {
+            print_note(format!("{unfilled} texels have no value, since the bake was ended before"));
+        }
         let mut save = |path: &Path, bytes: Result<Vec<u8>, FileError>| match bytes {
             Ok(bytes) => outputs.save_table(path, |out| out.write_all(&bytes)),
             Err(error) => outputs.fail(error),
@@ -103,12 +122,17 @@ impl MapFiles {
         let (charts, computed, filled) =
             (lightmap.charts(), map.count(Texel::Computed), lightmap.filled(&map));
         let padded = map.count(Texel::Filled) - filled;
-        let texels = json!({ "computed": computed, "filled": filled, "padded": padded });
+        let texels = json!({ "computed": computed, "filled": filled, "padded": padded, "open": unfilled });
         Saved {
             text: format!("{charts} charts, {computed} texels computed and {filled} filled; "),
             entries: vec![("charts", charts.into()), ("texels", texels)],
         }
     }
+}
+
+/// Time for the texels of a map that have no points, after a bake of so many seconds at most.
+fn limited(limit: Option<f64>) -> Duration {
+    Duration::try_from_secs_f64(limit.unwrap_or(0.0) * FILLING).unwrap_or(Duration::MAX)
 }
 
 /// File and format of a map.
@@ -191,7 +215,7 @@ impl BakeFiles {
         let MergedBake { baked, subject, quantity } = merged;
         match (self, subject) {
             (Self::Map(files), BakeSubject::Lightmap(lightmap)) => {
-                Some(files.save(outputs, (lightmap, baked, *quantity)))
+                Some(files.save(outputs, (lightmap, baked, *quantity), None))
             }
             (Self::Probes(files), BakeSubject::Probes(grid)) => Some(files.save(outputs, (grid, baked))),
             (Self::Tables(files), BakeSubject::Sensors(sensors)) => {

@@ -41,7 +41,7 @@ pub struct BakeSettings {
     pub light: LightPart,
     /// Caustic photons where a pilot finds that they pay.
     pub caustics: bool,
-    /// Source of the indirect light. A bake in parts, with a file, has paths alone.
+    /// Source of the indirect light. Shards have paths alone.
     pub method: PointMethod,
     /// Part of the points to estimate, in tiles of 256 near points; the others have no samples.
     pub shard: Shard,
@@ -156,8 +156,7 @@ impl BakeSettings {
     /// The settings of the core for a scene of so many `triangles` on so many threads.
     fn of_core(&self, triangles: usize, threads: usize) -> PointSettings {
         let Self { seed, max_depth, level, light, caustics, shard, ref stop, .. } = *self;
-        let is_in_file = self.checkpoint.is_some() || self.resume.is_some();
-        let method = if is_in_file { PointMethod::Path } else { self.method };
+        let method = if shard == Shard::WHOLE { self.method } else { PointMethod::Path };
         let rays = rays_per_second(triangles) * threads as f64;
         let rays = stop.seconds.map(|seconds| seconds * rays);
         let goal = Goal { rays, samples: stop.most_samples(), error: stop.error };
@@ -171,6 +170,7 @@ struct Kept<'a> {
     settings: &'a BakeSettings,
     identity: &'a Identity,
     points: usize,
+    goal: Goal,
     back_faces: &'a [f32],
     /// Start of this run, and seconds of the earlier ones.
     start: Instant,
@@ -183,13 +183,14 @@ struct Kept<'a> {
 impl<'a> Kept<'a> {
     fn new(
         settings: &'a BakeSettings,
-        (identity, points, back_faces): (&'a Identity, usize, &'a [f32]),
+        (identity, points, goal, back_faces): (&'a Identity, usize, Goal, &'a [f32]),
         (start, before): (Instant, f64),
         interrupt: &'a AtomicBool,
     ) -> Self {
         let path = settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path());
         let file = RewrittenFile::in_file(path);
-        Self { file, settings, identity, points, back_faces, start, before, saved: Instant::now(), interrupt }
+        let saved = Instant::now();
+        Self { file, settings, identity, points, goal, back_faces, start, before, saved, interrupt }
     }
 
     /// Writes the file if it is due.
@@ -215,7 +216,7 @@ impl<'a> Kept<'a> {
         }
         let beside = Beside { back_faces: self.back_faces, attached: &self.settings.attached };
         let seconds = self.before + self.start.elapsed().as_secs_f64();
-        let header = || BakeHeader::new(self.identity, (self.points, beside), renderer, seconds);
+        let header = || BakeHeader::new(self.identity, (self.points, beside, self.goal), renderer, seconds);
         let write =
             |path: &Path, patience: Patience| write_bake(path, &header(), (renderer, beside), patience);
         match last {
@@ -242,6 +243,7 @@ pub(crate) fn with_points(
     let open = |file: &PathBuf| BakeReader::open(file, memory.for_file());
     let earlier = settings.resume.as_ref().map(open).transpose()?;
     earlier.iter().try_for_each(|file| file.check(&identity, settings.shard))?;
+    let core = earlier.as_ref().map_or(core, |file| file.header.continuing(core));
     let given = Footprint::default().slice::<IrradiancePoint>(points.len()).slice::<f32>(points.len());
     memory.set_aside("given points", given)?;
     let mut lines = memory.take("points", IrradianceRenderer::footprint(scene, points.len(), core.method))?;
@@ -263,7 +265,8 @@ pub(crate) fn with_points(
     let mut renderer = IrradianceRenderer::over(structures, points, &core, &mut arena, &mut executor)?;
     let before = earlier.as_ref().map_or(0.0, |file| file.header.seconds);
     earlier.map_or(Ok(()), |file| file.resume(&mut renderer))?;
-    let mut kept = Kept::new(settings, (&identity, points.len(), &shares), (start, before), interrupt);
+    let mut kept =
+        Kept::new(settings, (&identity, points.len(), core.goal, &shares), (start, before), interrupt);
 
     let mut target = FIRST_SAMPLES.max(renderer.samples());
     let mut is_first = true;

@@ -34,6 +34,8 @@ pub struct CacheBuilder<'m> {
     /// Sweeps for these points that are done, and the records before the current sweep.
     sweeps: u32,
     before: usize,
+    /// Most records for now.
+    most: usize,
     /// Points at which light was gathered.
     pub(super) gathered: u32,
     /// Records that came from elsewhere, which are first in the cache.
@@ -86,6 +88,7 @@ impl<'m> CacheBuilder<'m> {
             next: 0,
             sweeps: 0,
             before: 0,
+            most: usize::MAX,
             gathered: 0,
             restored: 0,
             efforts,
@@ -115,6 +118,15 @@ impl<'m> CacheBuilder<'m> {
         (self.via, self.next, self.sweeps, self.before) = (Some(Via::Specular), 0, 0, self.restored);
     }
 
+    /// Allows so many records.
+    pub fn limit(&mut self, most: usize) {
+        self.most = most;
+    }
+
+    fn is_full(&self) -> bool {
+        self.cache.is_full() || self.cache.records().len() >= self.most
+    }
+
     /// Leaves the cache as it is.
     pub fn finish(&mut self) {
         self.via = None;
@@ -122,7 +134,7 @@ impl<'m> CacheBuilder<'m> {
 
     /// True if no record will be added.
     pub fn is_finished(&self) -> bool {
-        self.via.is_none() || self.cache.is_full()
+        self.via.is_none() || self.is_full()
     }
 
     /// Points at which light was gathered.
@@ -175,7 +187,7 @@ impl<'m> CacheBuilder<'m> {
             true => self.cache.covers_lobe(query),
             false => self.cache.covers(query),
         };
-        self.cache.is_full() || point.is_confined(least_pixels) || covers(&point.query())
+        self.is_full() || point.is_confined(least_pixels) || covers(&point.query())
     }
 
     /// Commits the record of `point`, with coefficients in `registers` if it has any.

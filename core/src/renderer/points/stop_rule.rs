@@ -15,30 +15,40 @@ pub(super) const FIRST_DECISION: u32 = 64;
 const WITHIN: f64 = 0.95;
 
 impl IrradianceRenderer<'_> {
-    /// Adds samples to the tiles that have not reached `error`, until all have or have `most` samples. Tiles
-    /// are judged at numbers of samples of their own, so that the steps are of no matter.
-    pub(super) fn sample_within(
+    /// Adds samples to all tiles, or to those that have not reached the `error`, until they have or have
+    /// `most` samples. Tiles and caches are judged at numbers of samples of their own, so that the steps are
+    /// of no matter.
+    pub(super) fn advance(
         &mut self,
-        (error, most): (f64, u32),
+        (error, most): (Option<f64>, u32),
         executor: &mut impl Executor,
     ) -> Result<(), OutOfMemory> {
-        self.aim_at(error);
-        let is_open = |finished: &[u8], tile: usize| finished.get(tile) == Some(&0);
-        while !executor.is_over() && self.has_open_tiles() {
-            let (target, is_decision) = (most.min(self.decision), self.decision <= most);
+        error.into_iter().for_each(|error| self.aim_at(error));
+        let is_open = |finished: &[u8], tile: usize| error.is_none() || finished.get(tile) == Some(&0);
+        while !executor.is_over() && (error.is_none() || self.has_open_tiles()) {
+            let is_judged = error.is_some() || self.audit.is_some();
+            let (target, is_decision) = match is_judged {
+                true => (most.min(self.decision), self.decision <= most),
+                false => (most, false),
+            };
             self.sample(executor, target, is_open)?;
             if executor.is_over() || !is_decision {
-                return Ok(());
+                break;
             }
-            if self.estimate(executor, target) {
+            if self.is_cache_useless(target) {
+                self.leave_cache();
                 continue;
             }
-            self.finish_tiles(error as f32);
+            if let Some(error) = error {
+                self.estimate(executor);
+                self.finish_tiles(error as f32);
+            }
             if target == MOST_SAMPLES {
-                return Ok(());
+                break;
             }
             self.decision = next_decision(target);
         }
+        self.estimate(executor);
         Ok(())
     }
 

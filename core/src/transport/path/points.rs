@@ -37,6 +37,9 @@ const LIES_ON: f32 = 4.0;
 /// Bound of the rounding of a coordinate that a few operations have computed, relative to the coordinate.
 const POINT_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
+/// Longest way off a border in margins: needles are thinner than their margins.
+const MOST_STEP: f32 = 16.0;
+
 /// Light of which the irradiance is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightPart {
@@ -125,20 +128,32 @@ impl IrradiancePoint {
         let corners = context.scene.mesh.corners(self.triangle);
         let (position, middle) = (Vec3::from(self.position), corners.iter().sum::<Vec3>() / 3.0);
         let margin = LIES_ON * (self.error + POINT_ROUNDING * position.abs().max_element());
-        // Part of the distance to the middle, which is as far from each edge as a third of its height.
-        let part = |i: usize| {
+        // Part of the distance to the middle, which is as far from each edge as a third of its height; the
+        // directions along the edge and from it.
+        let edges = [0, 1, 2].map(|i| {
             let (a, along) = (corners[i], corners[(i + 1) % 3] - corners[i]);
             let height = (corners[(i + 2) % 3] - a).reject_from(along);
-            let (full, distance) = (height.length(), (position - a).dot(height.normalize_or_zero()));
+            let (full, inward) = (height.length(), height.normalize_or_zero());
+            let distance = (position - a).dot(inward);
             let missing = (margin - distance).max(0.0);
-            missing / (full / 3.0 - distance).max(missing).max(f32::MIN_POSITIVE)
-        };
-        let step = part(0).max(part(1)).max(part(2)) * (middle - position);
+            let part = missing / (full / 3.0 - distance).max(missing).max(f32::MIN_POSITIVE);
+            (part, along.normalize_or_zero(), inward)
+        });
+        let part = edges.iter().fold(0f32, |most, (part, ..)| most.max(*part));
+        let step = (part * (middle - position)).clamp_length_max(MOST_STEP * margin);
         let Some(direction) = step.try_normalize() else { return self };
-        let inside = position + step;
+        let (inside, length) = (position + step, step.length());
         // Across the border, above the surface.
-        let origin = inside + self.error * Vec3::from(self.geometric_normal);
-        let has_wall = context.nearest(&Ray::segment(origin, -direction, 2.0 * step.length())).is_some();
+        let above = self.error * Vec3::from(self.geometric_normal);
+        let meets = |from: Vec3, direction: Vec3| {
+            context.nearest(&Ray::segment(from + above, direction, 2.0 * length)).is_some()
+        };
+        // A wall may end at the point: rays on both sides of it as well.
+        let beside = |(part, along, inward): &(f32, Vec3, Vec3)| {
+            let from = position + length * *inward;
+            *part > 0.0 && [-length, length].into_iter().any(|side| meets(from + side * *along, -*inward))
+        };
+        let has_wall = meets(inside, -direction) || edges.iter().any(beside);
         if has_wall { Self { position: inside.to_array(), ..self } } else { self }
     }
 

@@ -61,7 +61,7 @@ pub(crate) fn lightmap<'py>(
     })?;
     let baked = baked.map_err(|error| raised(py, error))?;
     let lightmap = Lightmap {
-        map: py.detach(|| texels.map(&baked, Quantity::Irradiance)),
+        map: py.detach(|| texels.map(&baked, Quantity::Irradiance, &|| true)),
         charts: texels.charts(),
         notes: texels.notes,
         seconds: baked.seconds[1],

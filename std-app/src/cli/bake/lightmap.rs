@@ -95,7 +95,7 @@ impl LightmapArgs {
         let baked =
             bake.bake(&loaded, lightmap.points(), (limit, attached), start.elapsed().as_secs_f64())?;
         baked.unsaved.iter().for_each(|why| outputs.fail(why.clone()));
-        let saved = files.save(&mut outputs, (&lightmap, &baked, bake.quantity()));
+        let saved = files.save(&mut outputs, (&lightmap, &baked, bake.quantity()), bake.time);
         let text = format!("{saved}{}", bake.text(&baked));
         let object = || {
             let mut object = bake.object(&baked);

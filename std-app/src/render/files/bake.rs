@@ -9,13 +9,17 @@ use crate::save::Patience;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::renderer::{IrradianceRenderer, PointFilm};
 use halflight_core::scene::Scene;
-use halflight_core::{IrradiancePoint, LightPart, PointSettings};
+use halflight_core::{Goal, IrradiancePoint, LightPart, PointMethod, PointSettings};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLBAKE", version: 2, name: "bake" };
+const KIND: Kind = Kind { magic: *b"HLBAKE", version: 3, name: "bake" };
+
+/// Why a bake cannot go on.
+const CUT: &str = "has a cache that time cut short, whose records cannot be had again: bake anew, with more time or \
+                   by paths";
 
 /// Most points, by their memory in a film.
 const MOST_POINTS: usize = 1 << 30;
@@ -33,6 +37,10 @@ pub(in crate::render) struct BakeHeader {
     decision: u32,
     error: f64,
     finished: Vec<u8>,
+    /// Rays, samples and error of the goal by which a cache was chosen.
+    goal: (Option<f64>, Option<u32>, Option<f64>),
+    /// True if a cache serves the indirect light, and true if there was no time for all of its records.
+    source: (bool, bool),
     /// Fractions of back faces: one of each point, or none.
     back_faces: usize,
     /// Bytes of the caller.
@@ -51,7 +59,7 @@ impl BakeHeader {
     /// Header of a bake after so many seconds.
     pub(in crate::render) fn new(
         identity: &Identity,
-        (points, beside): (usize, Beside),
+        (points, beside, Goal { rays, samples, error: goal_error }): (usize, Beside, Goal),
         renderer: &IrradianceRenderer,
         seconds: f64,
     ) -> Self {
@@ -66,6 +74,8 @@ impl BakeHeader {
             decision,
             error,
             finished: finished.to_vec(),
+            goal: (rays, samples, goal_error),
+            source: renderer.source(),
             back_faces: beside.back_faces.len(),
             attached: beside.attached.len(),
         }
@@ -84,13 +94,26 @@ impl BakeHeader {
             LightPart::Direct => "direct",
             LightPart::Indirect => "indirect",
         };
+        let method = match settings.method {
+            PointMethod::Path => "path",
+            PointMethod::IrradianceCache => "irradiance-cache",
+            PointMethod::Auto => "auto",
+        };
         Identity::of_program()
             .with("points", format_args!("{} {:016x}", points.len(), hash.value()))
             .with("seed", settings.seed)
             .with_some("max-depth", settings.max_depth, "unlimited")
             .with("light", light)
             .with("caustics", if settings.caustics { "on" } else { "off" })
+            .with("method", method)
             .with_scene(scene)
+    }
+
+    /// `settings` by which the bake is continued: of the same goal, and without a cache that it has left.
+    pub(in crate::render) fn continuing(&self, settings: PointSettings) -> PointSettings {
+        let ((rays, samples, error), (is_cached, _)) = (self.goal, self.source);
+        let method = if is_cached { settings.method } else { PointMethod::Path };
+        PointSettings { goal: Goal { rays, samples, error }, method, ..settings }
     }
 
     pub(in crate::render) fn shard(&self) -> Shard {
@@ -153,8 +176,13 @@ impl Reader {
     /// Refuses a bake of another identity or shard.
     pub(in crate::render) fn check(&self, identity: &Identity, shard: Shard) -> Result<(), FileError> {
         let own = (&self.header.identity, self.header.shard());
-        let difference = Identity::difference_of_shards(own, (identity, shard));
-        difference.map_or(Ok(()), |difference| Err(self.file.refusal(format!("is a bake {difference}"))))
+        if let Some(difference) = Identity::difference_of_shards(own, (identity, shard)) {
+            return Err(self.file.refusal(format!("is a bake {difference}")));
+        }
+        match self.header.source {
+            (true, true) => Err(self.file.refusal(CUT)),
+            _ => Ok(()),
+        }
     }
 
     /// Refuses a bake that cannot be merged with `first`.
