@@ -4,7 +4,7 @@
 
 use core::f32::consts::TAU;
 use core::hint::black_box;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, DiffuseOnly, Features};
 use halflight_core::sampling::Random;
