@@ -130,7 +130,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         };
         let (context, kind) = (&setup.context, method.kind);
         if let Some(made) = reconstruction.as_mut().filter(|_| kind.has_common_errors()) {
-            made.leave();
+            made.share();
         }
         let audit = match audit_fraction(settings.audit, kind.is_biased()) {
             Some(fraction) => {

@@ -73,6 +73,7 @@ pub fn merge_with(files: &[PathBuf], layers: &[Layer]) -> Result<Merged, RenderE
     let [width, height] = first.header.size();
     let spp = first.header.spp;
     let is_biased = first.header.method().is_some_and(Method::is_biased);
+    let is_shared = first.header.method().is_some_and(Method::has_common_errors);
     let is_reconstructed = films.iter().all(|film| film.header.has_surfaces);
     let mut footprint = RenderState::footprint(width, height);
     if is_reconstructed {
@@ -101,6 +102,9 @@ pub fn merge_with(files: &[PathBuf], layers: &[Layer]) -> Result<Merged, RenderE
     }
     let new = |surfaces| FilmReconstruction::new([width, height], surfaces, &mut arena);
     let mut reconstruction = is_reconstructed.then_some(&*surfaces).map(new).transpose()?;
+    if let Some(made) = reconstruction.as_mut().filter(|_| is_shared) {
+        made.share();
+    }
     let audits = headers.iter().map(|header| Some((header.shard(), header.audit()?)));
     let audits: Option<Vec<_>> = audits.collect();
     let pixels = audits.iter().flatten().map(|(_, audit)| audit.pixels.len()).sum();
