@@ -6,7 +6,8 @@
 //!
 //! The true error minus this estimate is a sum of products of errors of A and B. Its standard error comes
 //! from the squares of sums over blocks, which are large enough to be independent: of a tile for the products
-//! of pixels, of three tiles for those of filtered errors, of a sixth of the picture where records are shared.
+//! of pixels, of three tiles for those of filtered errors, of a sixth of the picture where pixels share
+//! records or photons.
 
 use super::Both;
 use super::passes::for_pieces;

@@ -139,10 +139,11 @@ impl<'m> FilmReconstruction<'m> {
         })
     }
 
-    /// States that pixels nearby have errors in common, by records or photons: pixels further away judge
-    /// them.
-    pub fn share(&mut self) {
-        self.is_shared = true;
+    /// The same for films whose pixels nearby have errors in common or not, by records or photons: pixels
+    /// further away judge them.
+    #[must_use]
+    pub fn shared(self, is_shared: bool) -> Self {
+        Self { is_shared, ..self }
     }
 
     /// Reconstructs `film`, whose own error is `raw`, if that makes the error smaller.

@@ -73,8 +73,7 @@ pub(super) struct Judges {
     /// Cells on each side whose pixels may have errors in common with those of the cell, and do not judge.
     /// `None` where the other group of pixels judges.
     pub hole: Option<usize>,
-    /// Standard errors of the linear coefficient within which the coarser picture wins, or the finer one
-    /// where negative.
+    /// Standard errors of the linear coefficient within which the finer picture wins.
     pub doubt: f64,
 }
 
@@ -128,9 +127,9 @@ pub(super) fn strengths(
     });
 }
 
-/// Minimum of the squared error, or of that less so many standard errors of its linear coefficient.
+/// Minimum of the squared error, with so many standard errors more as its linear coefficient.
 fn strength([linear, square, variance]: [f64; 3], doubt: f64) -> f32 {
-    let linear = linear - doubt * libm::sqrt(variance.max(0.0));
+    let linear = linear + doubt * libm::sqrt(variance.max(0.0));
     if square > LEAST_SQUARE { (-linear / (2.0 * square)).clamp(0.0, 1.0) as f32 } else { 1.0 }
 }
 

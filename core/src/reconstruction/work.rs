@@ -37,9 +37,12 @@ const BY_FITS: usize = 2;
 /// Half widths in pixels of the sums for strengths of whole pixels and mixed ones, by step.
 const RADII: [[f32; 2]; STEPS] = [[24.0, 43.0], [15.0, 22.0], [11.0, 22.0], [8.0, 16.0], [28.0, 56.0]];
 
-/// Standard errors within which the coarser picture wins: none in the last step, where few highlights that
-/// were spread have large ones.
-const DOUBTS: [f64; STEPS] = [1.0, 1.0, 1.0, 1.0, 0.0];
+/// Standard errors within which the finer picture wins: weights of errors see little of the bias of coarser
+/// ones. None in the last step, where few highlights that were spread have large ones.
+const DOUBTS: [f64; STEPS] = [0.5, 0.5, 0.5, 0.5, 0.0];
+
+/// The same where pixels further away judge, which say less of the bias of a place.
+const DOUBTS_OF_DISTANT: [f64; STEPS] = [1.0, 1.0, 1.0, 1.0, 0.0];
 
 /// Pixels with errors in common: cells along the longer side of the picture, cells on each side that do not
 /// judge, and half widths of the sums in cells. Supports of records are a part of the picture.
@@ -77,13 +80,11 @@ impl Halves<'_> {
 
     /// Pixels that choose the strengths of a step.
     fn judges(&self, step: usize) -> Judges {
-        let (cell, doubt) = (self.cell(), DOUBTS[step]);
+        let cell = self.cell();
+        let radii = REACH.map(|reach| (reach * cell) as f32);
         match self.is_shared {
-            true => {
-                let radii = REACH.map(|reach| (reach * cell) as f32);
-                Judges { radii, cell, hole: Some(HOLE), doubt: -doubt }
-            }
-            false => Judges { radii: RADII[step], cell, hole: None, doubt },
+            true => Judges { radii, cell, hole: Some(HOLE), doubt: DOUBTS_OF_DISTANT[step] },
+            false => Judges { radii: RADII[step], cell, hole: None, doubt: DOUBTS[step] },
         }
     }
 

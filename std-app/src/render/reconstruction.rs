@@ -36,9 +36,6 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
         taken => taken?,
     };
     let mut executor = Threads::new(workers, &mut scratch);
-    let mut made = FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?;
-    if let Some(made) = made.as_mut().filter(|_| method.has_common_errors()) {
-        made.share();
-    }
-    Ok((made, None))
+    let made = FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?;
+    Ok((made.map(|made| made.shared(method.has_common_errors())), None))
 }
