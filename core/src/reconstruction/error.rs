@@ -6,7 +6,8 @@
 //!
 //! The true error minus this estimate is a sum of products of errors of A and B. Its standard error comes
 //! from the squares of sums over blocks, which are large enough to be independent: of a tile for the products
-//! of pixels, of three tiles for those of filtered errors.
+//! of pixels, of three tiles for those of filtered errors, of a sixth of the picture where pixels share
+//! records or photons.
 
 use super::Both;
 use super::passes::for_pieces;
@@ -95,26 +96,35 @@ pub(super) fn sum_squares(
     });
 }
 
-/// Error of a picture of so many pixels from the sums over its squares.
-pub(super) fn total(across: usize, squares: &[SquareError], pixels: usize) -> ReconstructionError {
+/// Squares along the longer side whose errors are independent where pixels share records or photons.
+const INDEPENDENT: usize = 6;
+
+/// Error of a picture from the sums over its squares. `is_shared`: pixels nearby have errors in common.
+pub(super) fn total(
+    [width, height]: [usize; 2],
+    squares: &[SquareError],
+    is_shared: bool,
+) -> ReconstructionError {
     const WIDE: usize = MOST / SQUARE;
+    let across = width.div_ceil(SQUARE);
+    let widest = if is_shared { width.max(height) / (INDEPENDENT * SQUARE) } else { 0 };
+    let of_noise = WIDE.max(widest);
+    let of_bias = if is_shared { of_noise } else { 1 };
     let (mut sum, mut moments) = (SquareError::default(), [0.0; 2]);
-    let mut add = |sum: f64| {
-        let square = sum * sum;
-        moments = [moments[0] + square, moments[1] + square * square];
-    };
-    for square in squares {
-        sum += *square;
-        add(square.bias);
-    }
-    for rows in squares.chunks((across * WIDE).max(1)) {
-        for column in (0..across).step_by(WIDE) {
-            let of_row = |row: &[SquareError]| {
-                row.iter().skip(column).take(WIDE).map(|square| square.noise).sum::<f64>()
-            };
-            add(rows.chunks(across).map(of_row).sum());
+    squares.iter().for_each(|square| sum += *square);
+    let mut add = |side: usize, of: &dyn Fn(&SquareError) -> f64| {
+        for rows in squares.chunks((across * side).max(1)) {
+            for column in (0..across).step_by(side) {
+                let of_row = |row: &[SquareError]| row.iter().skip(column).take(side).map(of).sum::<f64>();
+                let sum: f64 = rows.chunks(across).map(of_row).sum();
+                let square = sum * sum;
+                moments = [moments[0] + square, moments[1] + square * square];
+            }
         }
-    }
+    };
+    add(of_bias, &|square| square.bias);
+    add(of_noise, &|square| square.noise);
+    let pixels = width * height;
     let values = 3.0 * pixels as f64;
     let [noise, bias, raw] = [sum.noise, sum.bias, sum.raw].map(|sum| sum / values);
     // A squared bias is not negative.

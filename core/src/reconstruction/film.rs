@@ -25,11 +25,13 @@ const FEWEST: u32 = 2;
 /// Fewest samples of a pixel of a film that is reconstructed.
 pub const LEAST_SAMPLES: u32 = 2 * FEWEST;
 
+/// Largest ratio of the errors of a reconstructed picture and of its samples where they share records or
+/// photons: the bias of the method, which halves do not see, is to stay far below.
+const MOST_RATIO: f64 = 0.8;
+
 /// Why a film is not reconstructed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotReconstructed {
-    /// Neighbouring pixels have errors in common.
-    Correlated,
     /// A half of a pixel has fewer than two samples, as outside of a shard or window.
     FewSamples,
     /// No half has met light.
@@ -42,7 +44,6 @@ impl NotReconstructed {
     /// Reason in reports.
     pub const fn reason(self) -> &'static str {
         match self {
-            Self::Correlated => "pixels that share records or photons cannot judge each other",
             Self::FewSamples => {
                 "a pixel has fewer than two samples in a half, as outside of a shard or window"
             }
@@ -61,6 +62,7 @@ pub struct FilmReconstruction<'m> {
     size: [u32; 2],
     unit: f32,
     parts: [f32; 2],
+    is_shared: bool,
     result: Result<Reconstructed, NotReconstructed>,
 }
 
@@ -126,20 +128,31 @@ impl<'m> FilmReconstruction<'m> {
         let groups = arena.slice(pixels)?;
         let memory = Reconstruction::new(size, arena)?;
         let (size, result) = ([width, height], Err(NotReconstructed::FewSamples));
-        Ok(Self { surfaces, values, groups, memory, size, unit: 1.0, parts: [0.5; 2], result })
+        Ok(Self {
+            surfaces,
+            values,
+            groups,
+            memory,
+            size,
+            unit: 1.0,
+            parts: [0.5; 2],
+            is_shared: false,
+            result,
+        })
     }
 
-    /// Leaves the pictures of this film as they are, since its neighbouring pixels have errors in common.
-    pub fn leave(&mut self) {
-        self.result = Err(NotReconstructed::Correlated);
+    /// The same for films whose pixels nearby have errors in common or not, by records or photons: pixels
+    /// further away judge them.
+    #[must_use]
+    pub fn shared(self, is_shared: bool) -> Self {
+        Self { is_shared, ..self }
     }
 
     /// Reconstructs `film`, whose own error is `raw`, if that makes the error smaller.
     pub fn update(&mut self, film: &Film, raw: Option<ErrorEstimate>, executor: &mut impl Executor) {
-        if self.result == Err(NotReconstructed::Correlated) {
-            return;
-        }
-        let gains = |result: &Reconstructed| raw.is_none_or(|raw| result.error.total.relmse < raw.relmse);
+        let most = if self.is_shared { MOST_RATIO } else { 1.0 };
+        let gains =
+            |result: &Reconstructed| raw.is_none_or(|raw| result.error.total.relmse < most * raw.relmse);
         self.result = self.reconstruct(film, executor).and_then(|result| match gains(&result) {
             true => Ok(result),
             false => Err(NotReconstructed::NoGain),
@@ -155,21 +168,28 @@ impl<'m> FilmReconstruction<'m> {
         (self.unit, self.parts) = (unit, parts);
         let [width, height] = self.size;
         let across = width as usize;
-        let Self { values, groups, .. } = self;
+        let Self { surfaces, values, groups, is_shared, .. } = self;
+        let (surfaces, is_shared) = (&**surfaces, *is_shared);
         for_both(executor, (values, across), (groups, across), |y, values, groups| {
             for (x, (value, group)) in values.iter_mut().zip(groups).enumerate() {
                 let (x, y) = (x as u32, y as u32);
                 let pixel = film.pixel(x, y);
                 let [a, b] = [pixel.even.mean(), pixel.odd.mean()].map(|mean| mean / unit);
                 *value = [a.x, a.y, a.z, b.x, b.y, b.z];
-                let place = Tile::position([width, height], x, y) % PIXELS_PER_TILE;
-                *group = (Tile::group(place) & 1) as u8;
+                *group = match is_shared {
+                    true => u8::from(is_near_edge(surfaces, [width, height], [x, y])),
+                    false => {
+                        let place = Tile::position([width, height], x, y) % PIXELS_PER_TILE;
+                        (Tile::group(place) & 1) as u8
+                    }
+                };
             }
         });
-        let Self { surfaces, values, groups, memory, .. } = self;
+        let Self { surfaces, values, groups, memory, is_shared, .. } = self;
+        let is_shared = *is_shared;
         let size = [across, height as usize];
         memory
-            .run(&Halves { size, values, parts, groups, surfaces }, executor)
+            .run(&Halves { size, values, parts, groups, surfaces, is_shared }, executor)
             .ok_or(NotReconstructed::FewSamples)
     }
 
@@ -228,6 +248,16 @@ impl<'m> FilmReconstruction<'m> {
         let [a, b] = [0, 3].map(|first| Rgb::from_slice(&value[first..first + 3]) * self.unit);
         Some([a, b, self.parts[0] * a + self.parts[1] * b])
     }
+}
+
+/// Pixels from an edge up to which light may vary fast, as in corners and contact shadows.
+const NEAR: u32 = 5;
+
+/// True if a pixel that sees several surfaces is near.
+fn is_near_edge(surfaces: &[PixelSurfaces], [width, height]: [u32; 2], [x, y]: [u32; 2]) -> bool {
+    let columns = x.saturating_sub(NEAR)..(x + NEAR + 1).min(width);
+    (y.saturating_sub(NEAR)..(y + NEAR + 1).min(height))
+        .any(|y| columns.clone().any(|x| !surfaces[(y * width + x) as usize].is_whole()))
 }
 
 /// Power of two near the mean, and the fractions of the samples that the halves have.

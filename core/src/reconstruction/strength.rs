@@ -4,20 +4,22 @@
 //! With H the coarse picture, F the fine one and δ = H − F, the squared error of F + ρ δ is a quadratic of ρ
 //! whose coefficients are sums over pixels: the halves estimate both the variance and the squared bias. A
 //! weight that a pixel's own noise chose would make its error look too small. The sums for pixels of one
-//! group are therefore over those of the other, and whole pixels and mixed ones are apart.
+//! group are therefore over those of the other, and whole pixels and mixed ones are apart. Where pixels
+//! nearby share records or photons, the sums are over pixels further away, and those near edges are apart.
 
-use super::passes::for_pieces;
+use super::passes::{for_both, for_pieces};
 use super::{Both, VALUES};
 use crate::method::Executor;
 
-/// Side of a cell in pixels.
+/// Least side of a cell in pixels.
 pub(super) const CELL: usize = 4;
 
 /// Sums of a cell for pixels of a group and kind: linear coefficient, quadratic one, square of the linear
 /// one.
 pub(super) type CellSums = [[f64; 3]; KINDS];
 
-/// Two groups of whole pixels, then two of mixed pixels.
+/// Two groups of whole pixels, then two of mixed pixels. Where pixels further away judge, whole pixels far
+/// from edges and near them are the first two.
 pub(super) const KINDS: usize = 4;
 
 /// Strengths of a cell for pixels of each group and kind.
@@ -56,24 +58,39 @@ impl Step<'_> {
     }
 }
 
-/// Cells along an axis.
-pub(super) const fn cells(size: usize) -> usize {
-    size.div_ceil(CELL)
+/// Cells of `side` pixels along an axis.
+pub(super) const fn cells(size: usize, side: usize) -> usize {
+    size.div_ceil(side)
 }
 
-/// Sums by tents of half width `radii`, in pixels, for whole pixels and mixed ones; then the strengths. The
-/// coarser picture wins within `doubt` standard errors. `rows` is working memory.
+/// Pixels that choose the strengths of a step for those of a cell.
+#[derive(Clone, Copy)]
+pub(super) struct Judges {
+    /// Half widths in pixels of tents around the cell, of whole pixels and mixed ones.
+    pub radii: [f32; 2],
+    /// Side of a cell in pixels.
+    pub cell: usize,
+    /// Cells on each side whose pixels may have errors in common with those of the cell, and do not judge.
+    /// `None` where the other group of pixels judges.
+    pub hole: Option<usize>,
+    /// Standard errors of the linear coefficient within which the finer picture wins.
+    pub doubt: f64,
+}
+
+/// Strengths of all cells, by the sums over their judges. `rows` is working memory: sums over whole rows, and
+/// over rows without the hole.
 pub(super) fn strengths(
     [across, down]: [usize; 2],
-    (radii, doubt): ([f32; 2], f64),
-    (sums, rows): (&[CellSums], &mut [CellSums]),
+    Judges { radii, cell, hole, doubt }: Judges,
+    (sums, [rows, holed]): (&[CellSums], [&mut [CellSums]; 2]),
     strengths: &mut [CellStrengths],
     executor: &mut impl Executor,
 ) {
-    let reach = radii.map(|radius| ((radius + 1.0) / CELL as f32) as usize);
+    let reach = radii.map(|radius| ((radius + 1.0) / cell as f32) as usize);
+    let is_outside = |distance: usize| hole.is_none_or(|hole| distance > hole);
     let tent = |kind: usize, distance: usize| {
         let radius = f64::from(radii[kind / 2]) + 1.0;
-        (1.0 - (distance * CELL) as f64 / radius).max(0.0)
+        (1.0 - (distance * cell) as f64 / radius).max(0.0)
     };
     let along = |at: usize, size: usize, value: &dyn Fn(usize, usize) -> [f64; 3]| -> CellSums {
         core::array::from_fn(|kind| {
@@ -87,37 +104,44 @@ pub(super) fn strengths(
             sum
         })
     };
-    for_pieces(executor, rows, across, |y, out| {
+    for_both(executor, (&mut *rows, across), (&mut *holed, across), |y, rows, holed| {
         let row = &sums[y * across..][..across];
-        for (x, out) in out.iter_mut().enumerate() {
+        for (x, out) in rows.iter_mut().enumerate() {
             *out = along(x, across, &|other, kind| row[other][kind]);
         }
+        for (x, out) in holed.iter_mut().enumerate().filter(|_| hole.is_some()) {
+            let outside = |other: usize| f64::from(u8::from(is_outside(other.abs_diff(x))));
+            *out = along(x, across, &|other, kind| row[other][kind].map(|sum| sum * outside(other)));
+        }
     });
-    let rows = &*rows;
+    let (rows, holed) = (&*rows, &*holed);
     for_pieces(executor, strengths, across, |y, out| {
         for (x, out) in out.iter_mut().enumerate() {
-            let sums = along(y, down, &|other, kind| rows[other * across + x][kind]);
-            // The group of the pixels that have these strengths is the other one.
-            *out = core::array::from_fn(|kind| strength(sums[kind ^ 1], doubt));
+            let sums = along(y, down, &|other, kind| {
+                let rows = if is_outside(other.abs_diff(y)) { rows } else { holed };
+                rows[other * across + x][kind]
+            });
+            let judge = |kind: usize| if hole.is_some() { kind } else { kind ^ 1 };
+            *out = core::array::from_fn(|kind| strength(sums[judge(kind)], doubt));
         }
     });
 }
 
-/// Minimum of the squared error, or of that less so many standard errors of its linear coefficient.
+/// Minimum of the squared error, with so many standard errors more as its linear coefficient.
 fn strength([linear, square, variance]: [f64; 3], doubt: f64) -> f32 {
-    let linear = linear - doubt * libm::sqrt(variance.max(0.0));
+    let linear = linear + doubt * libm::sqrt(variance.max(0.0));
     if square > LEAST_SQUARE { (-linear / (2.0 * square)).clamp(0.0, 1.0) as f32 } else { 1.0 }
 }
 
-/// Strength of a pixel, bilinear between the centres of cells.
+/// Strength of a pixel, bilinear between the centres of cells of side `cell`.
 pub(super) fn at(
-    strengths: &[CellStrengths],
+    (strengths, cell): (&[CellStrengths], usize),
     [across, down]: [usize; 2],
     [x, y]: [usize; 2],
     kind: usize,
 ) -> f32 {
     let split = |at: usize, size: usize| {
-        let position = ((at as f32 + 0.5) / CELL as f32 - 0.5).max(0.0);
+        let position = ((at as f32 + 0.5) / cell as f32 - 0.5).max(0.0);
         let first = (position as usize).min(size - 1);
         (first, (first + 1).min(size - 1), (position - first as f32).min(1.0))
     };

@@ -4,7 +4,9 @@ use super::error::{ReconstructionError, SQUARE, SquareError, of_pixel, sum_squar
 use super::fit::View;
 use super::passes::{for_both, for_pieces};
 use super::scale::{Scale, Shape};
-use super::strength::{self, CELL, CellStrengths, CellSums, KINDS, Step, cells, kind, mixed, strengths};
+use super::strength::{
+    self, CELL, CellStrengths, CellSums, Judges, KINDS, Step, cells, kind, mixed, strengths,
+};
 use super::surfaces::PixelSurfaces;
 use super::weights::{mean, weights};
 use super::{Both, VALUES, alike, despike};
@@ -35,9 +37,18 @@ const BY_FITS: usize = 2;
 /// Half widths in pixels of the sums for strengths of whole pixels and mixed ones, by step.
 const RADII: [[f32; 2]; STEPS] = [[24.0, 43.0], [15.0, 22.0], [11.0, 22.0], [8.0, 16.0], [28.0, 56.0]];
 
-/// Standard errors within which the coarser picture wins: none in the last step, where few highlights that
-/// were spread have large ones.
-const DOUBTS: [f64; STEPS] = [1.0, 1.0, 1.0, 1.0, 0.0];
+/// Standard errors within which the finer picture wins: weights of errors see little of the bias of coarser
+/// ones. None in the last step, where few highlights that were spread have large ones.
+const DOUBTS: [f64; STEPS] = [0.5, 0.5, 0.5, 0.5, 0.0];
+
+/// The same where pixels further away judge, which say less of the bias of a place.
+const DOUBTS_OF_DISTANT: [f64; STEPS] = [1.0, 1.0, 1.0, 1.0, 0.0];
+
+/// Pixels with errors in common: cells along the longer side of the picture, cells on each side that do not
+/// judge, and half widths of the sums in cells. Supports of records are a part of the picture.
+const CELLS: usize = 24;
+const HOLE: usize = 4;
+const REACH: [usize; 2] = [12, 15];
 
 /// Fractions of a picture by origin: the scales from the largest, and single pixels.
 pub const FRACTIONS: usize = STEPS;
@@ -51,13 +62,32 @@ pub struct Halves<'p> {
     pub values: &'p [Both],
     /// Fractions of the samples that the halves have.
     pub parts: [f32; 2],
-    /// Group of each pixel, 0 or 1: groups share no noise.
+    /// Group of each pixel, 0 or 1: groups share no noise, unless `is_shared`.
     pub groups: &'p [u8],
     /// Surfaces that each pixel sees.
     pub surfaces: &'p [PixelSurfaces],
+    /// True if pixels nearby have errors in common: then those further away of the same group choose the
+    /// strengths.
+    pub is_shared: bool,
 }
 
 impl Halves<'_> {
+    /// Side in pixels of the cells of strengths.
+    fn cell(&self) -> usize {
+        let [width, height] = self.size;
+        if self.is_shared { (width.max(height) / CELLS).max(CELL) } else { CELL }
+    }
+
+    /// Pixels that choose the strengths of a step.
+    fn judges(&self, step: usize) -> Judges {
+        let cell = self.cell();
+        let radii = REACH.map(|reach| (reach * cell) as f32);
+        match self.is_shared {
+            true => Judges { radii, cell, hole: Some(HOLE), doubt: DOUBTS_OF_DISTANT[step] },
+            false => Judges { radii: RADII[step], cell, hole: None, doubt: DOUBTS[step] },
+        }
+    }
+
     fn is_whole(&self) -> bool {
         let pixels = self.size[0] * self.size[1];
         let lengths = [self.values.len(), self.groups.len(), self.surfaces.len()];
@@ -82,6 +112,7 @@ pub struct Reconstruction<'m> {
     scales: [Scale<'m>; SHAPES.len()],
     sums: &'m mut [CellSums],
     rows: &'m mut [CellSums],
+    holed: &'m mut [CellSums],
     strengths: &'m mut [CellStrengths],
     squares: &'m mut [SquareError],
 }
@@ -108,6 +139,7 @@ impl<'m> Reconstruction<'m> {
             .slice::<Both>(pixels)
             .slice::<[f32; 3]>(pixels);
         let sums = Footprint::default()
+            .slice::<CellSums>(grid)
             .slice::<CellSums>(grid)
             .slice::<CellSums>(grid)
             .slice::<CellStrengths>(grid.saturating_mul(STEPS))
@@ -144,6 +176,7 @@ impl<'m> Reconstruction<'m> {
             scales,
             sums: arena.slice(grid)?,
             rows: arena.slice(grid)?,
+            holed: arena.slice(grid)?,
             strengths: arena.slice(grid.saturating_mul(STEPS))?,
             squares: arena.slice(squares)?,
         })
@@ -176,7 +209,7 @@ impl<'m> Reconstruction<'m> {
         let product = halves.parts[0] * halves.parts[1];
         let of_pixel = |i: usize| of_pixel(&picture[i], &halves.values[i], &weights[i], product);
         sum_squares([width, height], squares, of_pixel, executor);
-        let error = total(width.div_ceil(SQUARE), squares, width * height);
+        let error = total([width, height], squares, halves.is_shared);
         Some(Reconstructed { error, fractions: self.fractions(halves) })
     }
 
@@ -273,14 +306,17 @@ impl<'m> Reconstruction<'m> {
     /// Moves the picture towards the finer one of this step.
     fn step(&mut self, halves: &Halves, step: usize, executor: &mut impl Executor) {
         let Self { size: [width, height], even, picture, fine, finest, weights, scales, .. } = self;
-        let (width, grid) = (*width, [cells(*width), cells(*height)]);
-        let Self { sums, rows, strengths: all, .. } = self;
+        let cell = halves.cell();
+        let (width, grid) = (*width, [cells(*width, cell), cells(*height, cell)]);
+        let Self { sums, rows, holed, strengths: all, .. } = self;
         let product = halves.parts[0] * halves.parts[1];
         let coarse = &**picture;
-        for_both(executor, (fine, width * CELL), (sums, grid[0]), |row, fine, sums| {
+        let of_step = grid[0] * grid[1];
+        let sums = &mut sums[..of_step];
+        for_both(executor, (fine, width * cell), (sums, grid[0]), |row, fine, sums| {
             sums.fill([[0.0; 3]; KINDS]);
             for (place, fine) in fine.iter_mut().enumerate() {
-                let (x, y) = (place % width, row * CELL + place / width);
+                let (x, y) = (place % width, row * cell + place / width);
                 let i = y * width + x;
                 let surfaces = &halves.surfaces[i];
                 let raw = &halves.values[i];
@@ -292,21 +328,21 @@ impl<'m> Reconstruction<'m> {
                 let reference = if step < BY_FITS { &finest[i] } else { raw };
                 let step = Step { coarse: &coarse[i], fine, reference, weights: &weights[i] };
                 let [linear, square] = step.coefficients(product).map(f64::from);
-                let sum = &mut sums[x / CELL][kind(halves.groups[i], surfaces.is_whole())];
+                let sum = &mut sums[x / cell][kind(halves.groups[i], surfaces.is_whole())];
                 sum[0] += linear;
                 sum[1] += square;
                 sum[2] += linear * linear;
             }
         });
-        let of_step = grid[0] * grid[1];
+        let working = [rows, holed].map(|rows| &mut rows[..of_step]);
         let of_step = &mut all[step * of_step..][..of_step];
-        strengths(grid, (RADII[step], DOUBTS[step]), (sums, rows), of_step, executor);
+        strengths(grid, halves.judges(step), (sums, working), of_step, executor);
         let (fine, of_step) = (&*fine, &*of_step);
         for_pieces(executor, picture, width, |y, row| {
             for (x, out) in row.iter_mut().enumerate() {
                 let i = y * width + x;
                 let kind = kind(halves.groups[i], halves.surfaces[i].is_whole());
-                *out = mixed(out, &fine[i], strength::at(of_step, grid, [x, y], kind));
+                *out = mixed(out, &fine[i], strength::at((of_step, cell), grid, [x, y], kind));
             }
         });
     }
@@ -314,7 +350,8 @@ impl<'m> Reconstruction<'m> {
     /// Mean fractions by origin. The last step moves fireflies alone.
     fn fractions(&self, halves: &Halves) -> [f64; FRACTIONS] {
         let [width, height] = self.size;
-        let grid = [cells(width), cells(height)];
+        let cell = halves.cell();
+        let grid = [cells(width, cell), cells(height, cell)];
         let of_step = grid[0] * grid[1];
         let mut sums = [0.0; FRACTIONS];
         for (i, surfaces) in halves.surfaces.iter().enumerate() {
@@ -322,7 +359,7 @@ impl<'m> Reconstruction<'m> {
             let mut rest = 1.0;
             for step in (1..FRACTIONS).rev() {
                 let strengths = &self.strengths[(step - 1) * of_step..][..of_step];
-                let strength = strength::at(strengths, grid, [i % width, i / width], kind);
+                let strength = strength::at((strengths, cell), grid, [i % width, i / width], kind);
                 sums[step] += f64::from(rest * (1.0 - strength));
                 rest *= strength;
             }
@@ -338,7 +375,7 @@ const SHAPES_END: usize = SHAPES.len();
 /// Cells of strengths, and squares of errors.
 fn grids([width, height]: [usize; 2]) -> [usize; 2] {
     [
-        cells(width).saturating_mul(cells(height)),
+        cells(width, CELL).saturating_mul(cells(height, CELL)),
         width.div_ceil(SQUARE).saturating_mul(height.div_ceil(SQUARE)),
     ]
 }

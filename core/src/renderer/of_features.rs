@@ -103,7 +103,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
         let pilots = settings.goal.rays_alone().map_or(PilotSize::USUAL, PilotSize::of_picture);
         let (paths, level) = (settings.paths(), settings.level);
         let context = RenderContext { scene, bvh, lights, settings: paths, level, pilots };
-        let mut reconstruction = reconstructing::set_up::<F>(&context, settings, arena, executor)?;
+        let reconstruction = reconstructing::set_up::<F>(&context, settings, arena, executor)?;
         let mut memory = Buffer::new(arena.slice(arena.available())?);
         let lights = learn_visibility::<F>(&context, settings, &mut memory, executor)?;
         let setup = MethodSetup {
@@ -129,9 +129,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
             }
         };
         let (context, kind) = (&setup.context, method.kind);
-        if let Some(made) = reconstruction.as_mut().filter(|_| kind.has_common_errors()) {
-            made.leave();
-        }
+        let reconstruction = reconstruction.map(|made| made.shared(kind.has_common_errors()));
         let audit = match audit_fraction(settings.audit, kind.is_biased()) {
             Some(fraction) => {
                 let of_rays = AuditSettings { fraction, shard: settings.shard, by_clock: false };

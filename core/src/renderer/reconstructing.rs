@@ -3,14 +3,13 @@
 use super::{Reconstruct, RenderError, Settings};
 use crate::bsdf::Features;
 use crate::memory::{Arena, Footprint};
-use crate::method::{Executor, MethodKind, RenderContext, Shard};
+use crate::method::{Executor, RenderContext, Shard};
 use crate::reconstruction::{FilmReconstruction, FirstSurfaces};
 use crate::scene::Scene;
 
-/// True if pictures are to be reconstructed: whole ones, by methods whose pixels can judge each other.
+/// True if pictures are to be reconstructed: whole ones.
 fn is_wanted(settings: &Settings) -> bool {
-    let is_common = settings.method.kind().is_some_and(MethodKind::has_common_errors);
-    settings.reconstruct == Reconstruct::Auto && !is_common && settings.shard == Shard::WHOLE
+    settings.reconstruct == Reconstruct::Auto && settings.shard == Shard::WHOLE
 }
 
 /// Memory that stays taken, and memory for the search of surfaces before other structures are made.

@@ -153,12 +153,14 @@ fn a_reconstructed_picture_tells_its_error_and_keeps_its_film() {
                 renderer.step(executor, Until::Samples(16)).unwrap();
                 assert!(renderer.film().pixels() == film);
                 let report = renderer.error_report();
-                if has_common_errors {
-                    assert!(report.reconstructed.is_none() && renderer.picture().eq(renderer.film().rows()));
+                // Pixels that share photons are reconstructed where that gains much.
+                if has_common_errors && report.reconstructed.is_none() {
+                    assert!(renderer.picture().eq(renderer.film().rows()));
                     return;
                 }
                 let reconstructed = report.reconstructed.unwrap();
-                assert!(reconstructed.total.relmse < report.noise.unwrap().relmse, "{report:?}");
+                let most = if has_common_errors { 0.8 } else { 1.0 };
+                assert!(reconstructed.total.relmse < most * report.noise.unwrap().relmse, "{report:?}");
                 assert!(report.audited.is_some() || report.error() == Some(reconstructed.total));
                 assert!(!renderer.picture().eq(renderer.film().rows()));
             });

@@ -12,7 +12,7 @@ use crate::memory::{Budget, lines};
 use crate::save::Image;
 use halflight_core::audit::{AuditedPixels, ErrorReport};
 use halflight_core::findings::Findings;
-use halflight_core::memory::{Arena, Footprint};
+use halflight_core::memory::Arena;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::reconstruction::{FilmReconstruction, PixelLayers, PixelSurfaces};
 use halflight_core::transport::Counters;
@@ -73,14 +73,15 @@ pub fn merge_with(files: &[PathBuf], layers: &[Layer]) -> Result<Merged, RenderE
     let [width, height] = first.header.size();
     let spp = first.header.spp;
     let is_biased = first.header.method().is_some_and(Method::is_biased);
+    let is_shared = first.header.method().is_some_and(Method::has_common_errors);
     let is_reconstructed = films.iter().all(|film| film.header.has_surfaces);
+    let pixels = width as usize * height as usize;
     let mut footprint = RenderState::footprint(width, height);
     if is_reconstructed {
-        let surfaces = Footprint::default().slice::<PixelSurfaces>(width as usize * height as usize);
-        footprint = footprint.and(surfaces).and(FilmReconstruction::footprint([width, height]));
+        let made = FilmReconstruction::footprint([width, height]);
+        footprint = footprint.slice::<PixelSurfaces>(pixels).and(made);
     }
     // The picture, its variance and samples, and the data of its error estimate.
-    let pixels = width as usize * height as usize;
     let wanted = LayerSettings { layers: layers.to_vec(), objects: Vec::new() };
     let of_layers = layers::footprint(&wanted, pixels).bytes();
     let needed = footprint.bytes().saturating_add(80 * pixels).saturating_add(of_layers);
@@ -91,16 +92,15 @@ pub fn merge_with(files: &[PathBuf], layers: &[Layer]) -> Result<Merged, RenderE
     let mut arena = Arena::over(&mut lines);
     let mut state = RenderState::new(width, height, Shard::WHOLE, &mut arena)?;
     state.is_correlated = first.header.is_correlated;
-    let surfaces = if is_reconstructed { width as usize * height as usize } else { 0 };
-    let surfaces: &mut [PixelSurfaces] = arena.slice(surfaces)?;
-    let mut seconds = 0.0;
+    let surfaces: &mut [PixelSurfaces] = arena.slice(if is_reconstructed { pixels } else { 0 })?;
     let headers: Vec<FilmHeader> = films.iter().map(|film| film.header.clone()).collect();
+    let seconds = headers.iter().map(|header| header.seconds).sum();
     for film in films {
-        seconds += film.header.seconds;
         film.read_into(&mut state, is_reconstructed.then_some(&mut *surfaces))?;
     }
     let new = |surfaces| FilmReconstruction::new([width, height], surfaces, &mut arena);
-    let mut reconstruction = is_reconstructed.then_some(&*surfaces).map(new).transpose()?;
+    let reconstruction = is_reconstructed.then_some(&*surfaces).map(new).transpose()?;
+    let mut reconstruction = reconstruction.map(|made| made.shared(is_shared));
     let audits = headers.iter().map(|header| Some((header.shard(), header.audit()?)));
     let audits: Option<Vec<_>> = audits.collect();
     let pixels = audits.iter().flatten().map(|(_, audit)| audit.pixels.len()).sum();

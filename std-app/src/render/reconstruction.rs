@@ -8,9 +8,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::findings::Decision::LeftOut;
 use halflight_core::findings::Finding;
 use halflight_core::memory::MemorySource;
-use halflight_core::reconstruction::{
-    FilmReconstruction, FirstSurfaces, LEAST_SAMPLES, NotReconstructed, TOPIC,
-};
+use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces, LEAST_SAMPLES, TOPIC};
 use halflight_core::renderer::Reconstruct;
 
 /// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples, and the
@@ -27,9 +25,6 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
         return Ok((None, None));
     }
     let without = |reason| Ok((None, Some(Finding::new(TOPIC, LeftOut, reason))));
-    if method.has_common_errors() {
-        return without(NotReconstructed::Correlated.reason());
-    }
     let size = [settings.width, settings.height];
     let [kept, search] = FilmReconstruction::footprints_of_view::<F>(&scene.mesh, size);
     let mut take = || -> Result<_, RenderError> {
@@ -41,5 +36,6 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
         taken => taken?,
     };
     let mut executor = Threads::new(workers, &mut scratch);
-    Ok((FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?, None))
+    let made = FilmReconstruction::of_view::<F>(&setup.context(), &mut arena, &mut executor)?;
+    Ok((made.map(|made| made.shared(method.has_common_errors())), None))
 }
