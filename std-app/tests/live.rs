@@ -36,6 +36,20 @@ fn each_preview_is_a_whole_picture_and_the_last_is_the_result() {
     assert!(said.contains("now.gif"), "{said}");
 }
 
+#[test]
+fn pictures_that_are_shown_count_in_the_limit_of_memory() {
+    let folder = Folder::new("shown");
+    let render = "render scene.obj --size 400x300 --spp 1 --reconstruct off --method path -o whole.exr";
+    let alone = folder.object(&format!("{render} --json"))["memory_peak"].as_u64().unwrap();
+    for shown in ["--preview now.png", "--preview now.exr", "--tev=127.0.0.1:1"] {
+        let described = folder.object(&format!("{render} {shown} --json"));
+        let preview = described["memory"]["preview"].as_u64().unwrap();
+        assert!(preview >= 400 * 300 * 24 && described["memory_peak"] == alone + preview, "{shown}");
+        let said = folder.refused(&format!("{render} {shown} --memory {}", alone + preview - 1));
+        assert!(said.contains("memory"), "{shown}: {said}");
+    }
+}
+
 /// One packet of a client of tev: its kind, and its bytes without length and kind. `None` at the end.
 fn packet(stream: &mut impl Read) -> Option<(u8, Vec<u8>)> {
     let mut length = [0; 4];

@@ -1,9 +1,10 @@
-"""Renders that are killed, and pictures sent to the viewer tev.
+"""Renders that are killed, previews that are read while they are written, and pictures sent to the viewer tev.
 
-    HALFLIGHT=target/quick/halflight python3 tests/peers/live.py [--kills 50]
+    HALFLIGHT=target/quick/halflight python3 tests/peers/live.py [--kills 50] [--reads 1000]
 
 Renders with `--continue` are killed by SIGKILL at random times until there were enough kills; the picture of the one
-that ends must have the bytes of an uninterrupted render. The bytes that `--tev` sends are compared with those of tev's
+that ends must have the bytes of an uninterrupted render. Previews are read until there were enough reads, each of
+which must be a whole picture. The bytes that `--tev` sends are compared with those of tev's
 own client for the same pixels (PyPI `tevclient` and `numpy`).
 """
 
@@ -16,6 +17,7 @@ import subprocess
 import tempfile
 import threading
 import time
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +62,51 @@ def kills(folder, wanted):
     return same
 
 
+def is_whole_png(data):
+    """Whether all chunks of a PNG are there with right sums, and as many samples as pixels."""
+    at, packed, kinds = 8, b"", []
+    while at + 12 <= len(data):
+        length, kind = struct.unpack(">I4s", data[at : at + 8])
+        body = data[at + 8 : at + 8 + length]
+        if struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] != zlib.crc32(kind + body):
+            return False
+        packed += body if kind == b"IDAT" else b""
+        kinds.append(kind)
+        at += 12 + length
+    return kinds[-1:] == [b"IEND"] and len(zlib.decompress(packed)) == SIZE[1] * (1 + 3 * SIZE[0])
+
+
+def is_whole_pfm(data):
+    """Whether a PFM has all pixels, each of which is finite."""
+    header = f"PF\n{SIZE[0]} {SIZE[1]}\n-1.0\n".encode()
+    pixels = np.frombuffer(data[len(header) :], dtype="<f4") if data.startswith(header) else np.zeros(0)
+    return len(pixels) == 3 * SIZE[0] * SIZE[1] and bool(np.isfinite(pixels).all())
+
+
+def previews(folder, wanted):
+    """Whether all of `wanted` reads of a preview, which one render after the other rewrites, are whole pictures."""
+    good = True
+    for preview, is_whole in [(folder / "now.png", is_whole_png), (folder / "now.pfm", is_whole_pfm)]:
+        reads = broken = seed = 0
+        versions = set()
+        render = None
+        while reads < wanted:
+            if render is None or render.poll() is not None:
+                seed += 1
+                flags = ["--preview", preview, "--every", "1ms", "--seed", str(seed)]
+                render = subprocess.Popen(command(32, folder / "result.pfm", *flags))
+            if preview.exists():
+                data = preview.read_bytes()
+                reads += 1
+                broken += not is_whole(data)
+                versions.add(data)
+            time.sleep(0.002)
+        render.wait()
+        print(f"{preview.suffix}: {reads} reads of {len(versions)} pictures, {broken} of them broken")
+        good = good and broken == 0 and len(versions) > wanted / 50
+    return good
+
+
 def packets(folder):
     """Whether all packets are those of tev's client, whose last one is the picture."""
     server = socket.create_server(("127.0.0.1", 0))
@@ -97,7 +144,9 @@ def packets(folder):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--reads", type=int, default=1000)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        good = [packets(Path(name)), kills(Path(name), arguments.kills)]
+        folder = Path(name)
+        good = [packets(folder), previews(folder, arguments.reads), kills(folder, arguments.kills)]
     raise SystemExit(0 if all(good) else 1)

@@ -66,7 +66,7 @@ export interface Camera {
     eye?: Triple;
     target?: Triple;
     up?: Triple;
-    /** Vertical field of view in degrees. */
+    /** Vertical field of view in degrees, at most 178. */
     fov?: number;
     lensRadius?: number;
     focusDistance?: number;

@@ -16,6 +16,13 @@ use std::time::Instant;
 /// Seconds between two previews.
 const EVERY: f64 = 5.0;
 
+/// Bytes of a pixel while its picture is shown: the picture; its view, samples and file, whose buffer doubles
+/// as it grows, as PNG; channels, blocks and file in a linear format; a packet of tev.
+const PICTURE: usize = 12;
+const DISPLAYED: usize = 12 + 3 + 2 * 3;
+const LINEAR: usize = 3 * 12;
+const PACKET: usize = 12;
+
 #[derive(Args)]
 pub(super) struct LiveArgs {
     /// Rewrite a picture during the render: .png, .exr, .hdr or .pfm; readers always see a whole one
@@ -43,6 +50,14 @@ impl LiveArgs {
                 .advice("name a file, which is rewritten as a whole"));
         }
         outputs.plan(Role::Preview, file)
+    }
+
+    /// Most bytes that pictures of `size` take while they are shown, one after the other.
+    pub(super) fn bytes(&self, [width, height]: [u32; 2]) -> usize {
+        let of_file = |file| if Format::of(file).is_ok_and(Format::is_linear) { LINEAR } else { DISPLAYED };
+        let file = self.preview.as_deref().map(of_file);
+        let most = file.max(self.tev.as_ref().map(|_| PACKET));
+        most.map_or(0, |most| (PICTURE + most) * width as usize * height as usize)
     }
 
     /// The picture in progress, as PNG files in this `view`.

@@ -185,6 +185,7 @@ impl Render {
             survey: self.report.is_some().then_some(SURVEY_POINTS),
             layers: self.layers.settings(loaded),
             photon_view: self.report.is_some(),
+            shown_bytes: self.live.bytes([settings.width, settings.height]),
             ..settings
         })
     }

@@ -111,6 +111,8 @@ pub struct Settings {
     pub threads: Option<usize>,
     /// Memory limit in bytes for the scene and all structures; `None`: no limit.
     pub memory: Option<usize>,
+    /// Bytes that `progress` takes for pictures which it shows. They count in `memory`.
+    pub shown_bytes: usize,
     /// Instruction set of the kernels.
     pub level: Level,
     /// Stop rules.
@@ -176,6 +178,7 @@ impl Default for Settings {
             environment_visibility: None,
             threads: None,
             memory: None,
+            shown_bytes: 0,
             level: Level::detect(),
             stop: Stop::default(),
             reference: None,

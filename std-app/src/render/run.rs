@@ -101,6 +101,9 @@ impl<'a> Request<'a> {
         let pixels = width as usize * height as usize;
         let pictures = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
         memory.set_aside("picture", pictures.slice::<u32>(pixels))?;
+        if self.settings.shown_bytes > 0 {
+            memory.set_aside("preview", Footprint::default().slice::<u8>(self.settings.shown_bytes))?;
+        }
         Ok((memory, film))
     }
 

@@ -335,7 +335,7 @@ typedef struct {
     float target[3];
     // Direction that is up in the picture.
     float up[3];
-    // Vertical field of view.
+    // Vertical field of view, above 0 and at most 178.
     float vertical_fov_degrees;
     // Radius of the lens; 0: a pinhole.
     float lens_radius;

@@ -103,7 +103,7 @@ pub struct HalflightCamera {
     pub target: [f32; 3],
     /// Direction that is up in the picture.
     pub up: [f32; 3],
-    /// Vertical field of view.
+    /// Vertical field of view, above 0 and at most 178.
     pub vertical_fov_degrees: f32,
     /// Radius of the lens; 0: a pinhole.
     pub lens_radius: f32,

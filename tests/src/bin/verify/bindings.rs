@@ -27,7 +27,8 @@ pub(crate) fn c(project: &Project) -> Outcome {
 /// Installs the library into an empty prefix, and runs a program that is compiled by its file for pkg-config.
 fn installed(project: &Project, folder: &Path) -> Outcome {
     if !exists("cargo-cinstall") || !exists("pkg-config") {
-        return Ok("not installed: cargo install cargo-c".to_owned());
+        let advice = "cargo install cargo-c@0.10.24, apt-get install pkg-config";
+        return Err(Failure::Missing(format!("all but the installed library passes: {advice}")));
     }
     let prefix = project.root.join("target/prefix");
     let _ = fs::remove_dir_all(&prefix);
