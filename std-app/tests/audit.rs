@@ -19,7 +19,7 @@ fn an_audit_says_what_it_knows() {
     assert!(bias["detectable"].as_f64() > Some(0.0) && bias["found"].is_boolean());
     let detectable = bias["detectable"].as_f64().unwrap();
     let [bias, noise] = [bias, &error["noise"]].map(|part| part["relmse"].as_f64().unwrap());
-    // An uncertain bias counts for less (docs/decisions/bias-audit.md).
+    // An uncertain bias counts for less (docs/decisions/error-estimate.md).
     let sure = if bias > 0.0 { (bias - detectable * detectable / (4.0 * bias)).max(0.0) } else { 0.0 };
     assert!((error["relmse"].as_f64().unwrap() - noise - sure).abs() < 1e-12, "{bias} {detectable}");
     assert_eq!(folder.page_object("r"), audited);

@@ -33,7 +33,7 @@ const BY_PILOT: BidirectionalSettings =
 
 #[test]
 fn counts_by_the_pilot_are_nearly_the_best() {
-    // Not point-lights: the pilot misses a gain of 1.7 (docs/decisions/pilots.md).
+    // Not point-lights: the pilot misses a gain of 1.7 (docs/decisions/choice-of-method.md).
     for scene in ["box", "bright-room", "mirror-caustic", "coats", "twelve-rooms"] {
         let Some(scene) = SCENES.iter().find(|other| other.name == scene) else { panic!("{scene}") };
         let name = scene.name;

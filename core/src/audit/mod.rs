@@ -1,6 +1,6 @@
 //! Audit of a picture: the unbiased path tracer renders some of its pixels as well, in step with the picture.
-//! Their difference beyond noise is bias (docs/decisions/bias-audit.md). Noise, blur and bias make the error
-//! of a picture.
+//! Their difference beyond noise is bias (docs/decisions/error-estimate.md). Noise, blur and bias make the
+//! error of a picture.
 
 mod choice;
 mod hidden;

@@ -1,5 +1,5 @@
 //! Audit: the bias of a picture, estimated from a few pixels that an unbiased estimator renders as well
-//! (docs/decisions/bias-audit.md).
+//! (docs/decisions/error-estimate.md).
 //!
 //! A and B are the halves of a pixel in the picture, U and V its halves in the audit, all independent. (A −
 //! U) and (B − V) both have the bias of the pixel as mean and share no noise, so that their product has the

@@ -1,5 +1,5 @@
 //! Blur of density estimates in a picture: each sample gathers photons from a disc, and estimates the
-//! difference to a finer disc (docs/decisions/photon-discs.md).
+//! difference to a finer disc (docs/decisions/photon-map.md).
 //!
 //! The halves of a pixel estimate its blur as a and b with independent noise, so that a b has the squared
 //! blur as mean. It is divided by R² + 0.01 m², averaged over R = I − a and R = I − b: beside a focus a pixel

@@ -27,7 +27,7 @@ const AUDIT: f64 = 0.2;
 
 /// Work of filling one of both caches, relative to that of the bake, above which paths take its place: a part
 /// of the predicted ratio of squared errors, so that little is lost where little is to be gained, and its
-/// most (docs/decisions/point-caches.md#work-of-filling).
+/// most (docs/decisions/bakes.md#work-of-filling).
 const FILLING_OF_GAIN: f64 = 0.05;
 const MOST_FILLING: f64 = 0.5;
 

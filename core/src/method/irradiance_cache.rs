@@ -29,7 +29,7 @@ pub const LEAST_PIXELS: f32 = 2.0;
 
 /// Fraction of the time for each of both caches, of the time that is left before the first is filled: both
 /// are cut alike. Points that no record reaches by then are path traced. A smaller fraction leaves more to
-/// paths where filling is slow (docs/decisions/cache-time.md#deadline).
+/// paths where filling is slow (docs/decisions/cache-lookups.md#deadline).
 const TIME: f32 = 0.18;
 
 /// The same for each half of the view-bound records, of the time that is left when the caches are filled.

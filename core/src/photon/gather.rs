@@ -13,7 +13,7 @@
 //!
 //! The same traversal also estimates the density over finer discs, of half the radius and less. They serve
 //! places where photons are dense, and they show the blur of the whole disc
-//! (`docs/decisions/photon-discs.md`).
+//! (`docs/decisions/photon-map.md`).
 
 use super::PhotonMap;
 use super::kernel::{Kernel, QueryDisc};

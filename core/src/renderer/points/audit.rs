@@ -1,5 +1,5 @@
 //! Audit of points by a cache: the squared relative bias, from some points that are path traced as well
-//! (docs/decisions/bias-audit.md).
+//! (docs/decisions/error-estimate.md).
 
 use super::film::{OFFSET, PointFilm};
 use super::layout::Layout;

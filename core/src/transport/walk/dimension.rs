@@ -48,7 +48,7 @@ pub(crate) const fn vertex(n: u32) -> u32 {
 
 /// Random numbers of the scattered direction at the vertex that ends segment `n`. At the first vertex they
 /// are stratified together with the position in the pixel, since radiance after one bounce is often smooth in
-/// all four (docs/decisions/sampling.md#pairs-and-quads).
+/// all four (docs/decisions/path-tracing.md#pairs-and-quads).
 #[inline]
 pub(crate) fn scattering(sampler: &Sampler, n: u32) -> [f32; 2] {
     if n == 1 {

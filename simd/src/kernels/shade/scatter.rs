@@ -11,7 +11,7 @@ use crate::level::{Kernel, Level};
 
 /// Throughput from which a path survives with certainty; below, the probability is proportional to it. There
 /// is no minimum number of segments: early ends of dark paths save the most time
-/// (docs/decisions/sampling.md).
+/// (docs/decisions/path-tracing.md).
 pub const CERTAIN_FROM: f32 = 0.25;
 
 /// BSDF sampling of a block.
