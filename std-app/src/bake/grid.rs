@@ -28,8 +28,8 @@ impl Grid {
     }
 
     /// Makes unknown cells known in at most `rings` rings around the known ones: `take(cell, from)` is called
-    /// for each, with the known neighbours of which `may_take(cell, neighbour)` holds. Cells stay unknown from
-    /// when `watch` returns false.
+    /// for each, with the known neighbours of which `may_take(cell, neighbour)` holds. Where `watch` returns
+    /// false, the other cells stay unknown.
     pub(super) fn fill(
         self,
         is_known: &mut [bool],

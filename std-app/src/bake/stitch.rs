@@ -1,5 +1,5 @@
-//! Stitching of seams: the least change of the texels by which fetches on both sides of a seam agree (Iwanicki
-//! 2013), by conjugate gradients. Texels of wide intervals give way to those of narrow ones.
+//! Stitching of seams: the least change of the texels by which fetches on both sides of a seam agree
+//! (Iwanicki 2013), by conjugate gradients. Texels of wide intervals give way to those of narrow ones.
 
 use super::map::LightMap;
 use super::seams::Seam;

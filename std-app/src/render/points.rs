@@ -226,6 +226,12 @@ impl<'a> Kept<'a> {
     }
 }
 
+/// Samples after the next round, which follows one of so many `seconds`: they double until rounds are long.
+fn grown(samples: u32, seconds: f64) -> u32 {
+    let growth = (LONGEST_ROUND / seconds.max(1e-6)).clamp(0.125, 1.0);
+    samples.saturating_add((f64::from(samples) * growth).ceil() as u32).min(1 << 30)
+}
+
 /// Estimates the irradiance of `points` with the structures of `built`.
 pub(crate) fn with_points(
     (scene, built): (&Scene, &Built),
@@ -292,9 +298,7 @@ pub(crate) fn with_points(
         if is_exact || is_full || is_over || workers.deadline.is_interrupted() {
             break;
         }
-        // Rounds double until they are long.
-        let growth = (LONGEST_ROUND / round.elapsed().as_secs_f64().max(1e-6)).clamp(0.125, 1.0);
-        target = target.saturating_add((f64::from(target) * growth).ceil() as u32).min(1 << 30);
+        target = grown(target, round.elapsed().as_secs_f64());
     }
     let unsaved = kept.finish(&renderer);
     Ok(Baked {

@@ -1,5 +1,5 @@
-//! A short run of every fuzz target from its corpus by the driver `mutate`; a campaign, which `--fuzz-seconds`
-//! asks for, is guided by coverage where cargo-fuzz and a nightly toolchain are installed.
+//! A short run of every fuzz target from its corpus by the driver `mutate`. A campaign, which
+//! `--fuzz-seconds` asks for, is guided by coverage where cargo-fuzz and a nightly toolchain are installed.
 
 use crate::command::{command, fresh_cargo, in_pairs, output, run};
 use crate::{Failure, Outcome, Project};
