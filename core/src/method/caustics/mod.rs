@@ -52,7 +52,8 @@ pub(super) fn footprint(lights: usize, pixels: usize) -> Footprint {
 pub fn are_possible(scene: &Scene) -> bool {
     let census = Census::of(scene);
     let kinds = &census.surfaces;
-    let casters = kinds.mirror + kinds.conductor + kinds.glossy + kinds.dielectric + kinds.rough_dielectric;
+    let metals = kinds.mirror + kinds.conductor + kinds.glossy;
+    let casters = metals + kinds.dielectric + kinds.rough_dielectric + kinds.pane;
     casters > 0 && kinds.diffuse + kinds.glossy > 0 && census.has_light()
 }
 
