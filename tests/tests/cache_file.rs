@@ -91,7 +91,7 @@ fn a_cache_of_something_else_is_refused_and_told_why() {
     let why = refused(&buffers, |_| ());
     assert!(why.ends_with("a cache of another scene, or its geometry changed since"), "{why}");
     std::fs::write(&file, b"no cache").unwrap();
-    assert!(refused(&buffers, |_| ()).contains("too short"));
+    assert!(refused(&buffers, |_| ()).contains("is no cache file"));
     std::fs::remove_file(&file).unwrap();
     assert!(refused(&buffers, |_| ()).contains("no such file"));
     let why = render(&buffers, None, Some(&file), |s| s.method = Some(Method::Path)).unwrap_err();

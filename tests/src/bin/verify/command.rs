@@ -1,11 +1,11 @@
 //! Child processes: prints each command line, and names it if it fails.
 
 use crate::{Failure, Outcome};
+use core::iter;
+use core::sync::atomic::{AtomicUsize, Ordering};
 use std::io::{BufRead, BufReader};
-use std::iter;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 /// `program arguments…` in `directory`, split at spaces.
