@@ -185,7 +185,7 @@ fn bad_sensors_and_outputs_are_refused_before_the_work() {
     for (arguments, message) in [
         ("bake scene.obj --points bad.pts", "bad.pts: line 2: 5 numbers where six are expected"),
         ("bake scene.obj --points none.pts", "none.pts"),
-        ("bake scene.obj", "--points"),
+        ("bake scene.obj", "<--points <FILE>|--vertices|--lightmap <NAME>|--probes <NXxNYxNZ>>"),
         ("bake scene.obj --vertices -o table.txt", "a table is .csv, .res or .ply"),
         ("bake scene.obj --points grid.csv -o grid.csv", "would overwrite the input"),
         ("bake scene.obj --vertices --error 0", "--error"),

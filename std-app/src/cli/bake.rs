@@ -11,7 +11,7 @@ use super::outputs::Outputs;
 use super::picture_args::{Caustics, note_darkness, render_failure};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::{print_note, values};
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use halflight::bake::{
     self, BakeSettings, Baked, Quantity, TableFormat, attachment, read_sensors, vertices, write_table,
 };
@@ -33,14 +33,15 @@ use std::process::ExitCode;
 /// its normal. The first of --spp, --time and --error that holds ends the work; without one it ends when the
 /// intervals are 2 %, or after 60 s.
 #[derive(Args)]
+#[command(group = ArgGroup::new("subject").required(true).args(["points", "vertices", "lightmap", "probes"]))]
 pub(super) struct Bake {
     /// Scene: a mesh (.obj), glTF (.glb, .gltf) or a scene file (.toml)
     scene: PathBuf,
     /// Sensors, a line `x y z nx ny nz` each; `-` is standard input
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["vertices", "lightmap", "probes"])]
+    #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
     /// All vertices of the scene, on the front of their triangles
-    #[arg(long, conflicts_with = "points")]
+    #[arg(long)]
     vertices: bool,
     #[command(flatten)]
     lightmap: lightmap::LightmapArgs,
