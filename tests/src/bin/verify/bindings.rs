@@ -32,7 +32,7 @@ fn installed(project: &Project, folder: &Path) -> Outcome {
     }
     let prefix = project.root.join("target/prefix");
     let _ = fs::remove_dir_all(&prefix);
-    let mut cargo = command(folder, "cargo cinstall --profile quick --locked --quiet --libdir lib --prefix");
+    let mut cargo = command(folder, "cargo cinstall --profile quick --locked --libdir lib --prefix");
     run(cargo.arg(&prefix).env("CARGO_TARGET_DIR", project.root.join("target/cinstall")))?;
     let mut config = command(folder, "pkg-config --cflags --libs halflight");
     let flags = output(config.env("PKG_CONFIG_PATH", prefix.join("lib/pkgconfig")))?;
