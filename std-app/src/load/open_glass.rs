@@ -59,15 +59,19 @@ fn is_flat(geometry: &Geometry, material: u32) -> bool {
     let bits = |p: Vec3| (p + 0.0).to_array().map(f32::to_bits);
     geometry.triangles.iter().filter(|t| t.material == material).all(|triangle| {
         let corners = triangle.vertices.map(position);
-        let [along, across] = [corners[1] - corners[0], corners[2] - corners[0]];
-        let normal = along.cross(across).normalize_or_zero();
-        let size = along.length().max(across.length());
+        let (normal, distance) = plane(corners);
         // Every corner has a plane of the triangles around it: neighbours hand it on.
         corners.iter().all(|&corner| {
             let (origin, of_corner) = *planes.entry(bits(corner)).or_insert((corners[0], normal));
-            corners.iter().all(|&other| of_corner.dot(other - origin).abs() <= FLAT * size)
+            corners.iter().all(|&other| of_corner.dot(other - origin).abs() <= distance)
         })
     })
+}
+
+/// Unit normal of a triangle, zero without one, and the distance within which points lie in its plane.
+fn plane([a, b, c]: [Vec3; 3]) -> (Vec3, f32) {
+    let [along, across] = [b - a, c - a];
+    (along.cross(across).normalize_or_zero(), FLAT * along.length().max(across.length()))
 }
 
 /// Number of open edges of each glass, roots of the pieces that have them or are flat with two faces at each
@@ -140,14 +144,16 @@ fn flat(
     let mut planes: HashMap<u32, (Vec3, Vec3, u32, bool)> = HashMap::new();
     for triangle in geometry.triangles.iter().filter(is_glass) {
         let corners = triangle.vertices.map(|v| Vec3::from(geometry.positions[v as usize]));
-        let [along, across] = [corners[1] - corners[0], corners[2] - corners[0]];
-        let normal = along.cross(across).normalize_or_zero();
-        let plane = planes.entry(root(triangle.vertices[0]));
-        let (origin, of_piece, _, is_flat) = plane.or_insert((corners[0], normal, triangle.material, true));
-        let bound = FLAT * along.length().max(across.length());
-        *is_flat &= corners.iter().all(|&corner| of_piece.dot(corner - *origin).abs() <= bound);
+        let (normal, distance) = plane(corners);
+        // Others share the corners of a triangle that rounding has left without a plane.
+        if normal == Vec3::ZERO {
+            continue;
+        }
+        let piece = planes.entry(root(triangle.vertices[0]));
+        let (origin, of_piece, _, is_flat) = piece.or_insert((corners[0], normal, triangle.material, true));
+        *is_flat &= corners.iter().all(|&corner| of_piece.dot(corner - *origin).abs() <= distance);
     }
-    planes.into_iter().filter(|(_, plane)| plane.3).map(|(root, plane)| (root, plane.2)).collect()
+    planes.into_iter().filter(|(_, piece)| piece.3).map(|(root, piece)| (root, piece.2)).collect()
 }
 
 fn edges_of([a, b, c]: [u32; 3]) -> impl Iterator<Item = [u32; 2]> {

@@ -20,14 +20,14 @@ use std::time::Instant;
 /// Rings of texels around charts without `--pad`: enough for bilinear fetches of two mip levels.
 const PADDING: u32 = 4;
 
-/// Subjects of other runs. clap drops a requirement that conflicts with another flag.
+/// Subjects of other runs, in which flags of a lightmap have no meaning.
 const OTHERS: [&str; 3] = ["points", "vertices", "probes"];
 
 #[derive(Args)]
 pub(super) struct LightmapArgs {
     /// Lightmap of a mesh, by the name of its file, of an object, by its `o` or `g` or node, of a material,
     /// or of `all`, in the texture coordinates of the files
-    #[arg(long, value_name = "NAME", requires = "size", conflicts_with_all = OTHERS)]
+    #[arg(long, value_name = "NAME", requires = "size")]
     lightmap: Option<String>,
     /// Width and height of the lightmap in texels
     #[arg(long, value_name = "WxH", value_parser = values::size, conflicts_with_all = OTHERS)]

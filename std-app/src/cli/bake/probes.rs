@@ -13,8 +13,7 @@ use std::process::ExitCode;
 #[derive(Args)]
 pub(super) struct ProbeArgs {
     /// Light probes at the centres of so many cells along x, y and z
-    #[arg(long, value_name = "NXxNYxNZ", value_parser = values::grid,
-          conflicts_with_all = ["points", "vertices", "lightmap", "unit"])]
+    #[arg(long, value_name = "NXxNYxNZ", value_parser = values::grid, conflicts_with = "unit")]
     probes: Option<[u32; 3]>,
     /// Box of the cells of probes in the coordinates of the files [default: that of the scene]
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds,

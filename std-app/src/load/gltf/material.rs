@@ -28,7 +28,7 @@ pub(super) struct Materials {
     numbers: HashMap<Option<usize>, usize>,
     materials: Vec<MtlMaterial>,
     texcoords: Vec<(Pair, Option<Pair>)>,
-    /// What vertex colours are a factor on, and true if their alpha is one on the opacity.
+    /// Input on which vertex colours are a factor, and true if their alpha is one on the opacity.
     colorable: Vec<(MapKind, bool)>,
     images: HashMap<usize, Option<PathBuf>>,
     pictures: HashMap<PathBuf, Bytes>,

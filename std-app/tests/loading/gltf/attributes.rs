@@ -26,7 +26,7 @@ fn two_sets(of_emission: Value) -> Gltf {
     file
 }
 
-/// What `read` finds at barycentric coordinates of a triangle.
+/// The result of `read` at barycentric coordinates of a triangle.
 fn at<T>(
     scene: &LoadedScene,
     triangle: u32,
