@@ -5,7 +5,8 @@
 Prints a row for each scene and method, and a summary of each method: films that are reconstructed, geometric mean
 and least of the gain, told over true error, and how many intervals hold. References are pairs of pictures of other
 seeds by a method without bias, kept in the output folder: in the product of the differences from both their noise
-cancels. Rooms are those of random_rooms.py. Needs numpy, and the published scenes in HALFLIGHT_SCENES.
+cancels. A third picture, reconstructed, gives the weights: noise of a reference makes those of dark pixels too large.
+Rooms are those of random_rooms.py. Needs numpy, and the published scenes in HALFLIGHT_SCENES.
 """
 
 import argparse
@@ -17,10 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from ablation import read_pfm
-from measure import relmse_of_pair
 from methods import PROGRAM, ROOT, SCENES, reference_method, scene_file
 
-OUTPUT = ROOT / "tests" / "output" / "reconstruction"
+OUTPUT = ROOT / "tests" / "output" / "reconstruction-weighted"
 NEAR = (0.8, 1.25)
 
 
@@ -36,26 +36,33 @@ def render(scene, side, *flags):
 
 
 def reference(name, scene, a):
-    """Two long pictures by a method that has no bias."""
+    """Two long pictures by a method that has no bias, and a reconstructed one for the weights of errors."""
     kept = OUTPUT / f"{name}-{a.side}.npz"
     if not kept.exists():
         by_light = reference_method(name) in ("bdpt", "vcm", "sppm")
         samples = a.reference_spp // 3 if by_light else a.reference_spp
-        flags = ["--method", "bdpt" if by_light else "path", "--spp", str(samples), "--reconstruct", "off"]
-        np.savez(kept, pair=[render(scene, a.side, *flags, "--seed", seed)[0] for seed in ("7000", "7001")])
-    return np.load(kept)["pair"]
+        flags = ["--method", "bdpt" if by_light else "path", "--spp", str(samples)]
+        pair = [render(scene, a.side, *flags, "--reconstruct", "off", "--seed", seed)[0] for seed in ("7000", "7001")]
+        np.savez(kept, pair=pair, of_weights=render(scene, a.side, *flags, "--seed", "7002")[0])
+    return np.load(kept)
 
 
-def row(name, scene, method, pair, a):
+def relmse(picture, reference):
+    """relMSE against the pair of a reference, in whose product of differences its noise cancels."""
+    (first, second), light = reference["pair"], reference["of_weights"]
+    return float(np.mean((picture - first) * (picture - second) / (light**2 + 0.01 * np.mean(light) ** 2)))
+
+
+def row(name, scene, method, reference, a):
     """Facts of one film."""
     flags = ["--method", method, "--spp", str(a.spp), "--seed", "3"]
     raw, _ = render(scene, a.side, *flags, "--reconstruct", "off")
     made, facts = render(scene, a.side, *flags)
-    true, error = relmse_of_pair(made, pair), facts["error"]
+    true, error = relmse(made, reference), facts["error"]
     low, high = error["interval"]
     found = {
         "scene": name, "method": method, "used": facts["findings"]["reconstruction"]["decision"] == "used",
-        "raw": relmse_of_pair(raw, pair), "reconstructed": true, "told": error["relmse"] / true,
+        "raw": relmse(raw, reference), "reconstructed": true, "told": error["relmse"] / true,
         "low": low, "high": high, "holds": low <= true <= high,
     }
     (OUTPUT / f"{name}-{method}-{a.side}-{a.spp}.json").write_text(json.dumps(found, default=bool))
@@ -77,10 +84,10 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
             scene = scene_file(name, folder)
-            pair = reference(name, scene, a)
+            known = reference(name, scene, a)
             for method in a.methods.split(","):
                 kept = OUTPUT / f"{name}-{method}-{a.side}-{a.spp}.json"
-                found = json.loads(kept.read_text()) if kept.exists() else row(name, scene, method, pair, a)
+                found = json.loads(kept.read_text()) if kept.exists() else row(name, scene, method, known, a)
                 rows.append(found)
                 made = f"{found['reconstructed']:.1e}" if found["used"] else "the samples"
                 interval = f"{found['low']:.1e} to {found['high']:.1e}" + ("" if found["holds"] else ", misses")
