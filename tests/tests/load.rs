@@ -86,6 +86,7 @@ fn what_is_repaired_is_said_once() {
     let scene = repairs(&format!("{SQUARE}f 1 1 2\nf 1 2 3\n"), "without area");
     assert_eq!(scene.triangles.len(), 1);
     repairs(&format!("{SQUARE}vt 0 0\nf 1/1 2 3\n"), "texture coordinate in only some corners");
+    repairs(&format!("{SQUARE}vt 0 0\nf 1/ 2 3\n"), "without an index after its last slash");
     let scene = repairs(&format!("{SQUARE}vn 0 0 1\nf 1//1 2 3\n"), "normal in only some corners");
     assert!(scene.normals.iter().all(|&n| n == [0.0; 3]));
     let scene = repairs(&format!("{SQUARE}vn 0 0 0\nf 1//1 2//1 3//1\n"), "zero normal");
