@@ -303,6 +303,7 @@ fn a_scene_file_that_is_wrong_says_where() {
     wrong(&format!("{light}intensity = 1"), 4, "too small");
     wrong("[environment]\nto_world = [[2,0,0,0],[0,1,0,0],[0,0,1,0]]", 2, "angles and lengths");
     wrong("[environment]\nmap = \"sky.exr\"", 2, "there is no file");
+    wrong("[environment]\nmap = \"a.obj\"", 2, "a.obj cannot be read: it is in no format");
     wrong("[render]\nsamples = 4", 2, "unknown field `samples`");
     let unused = toml("[[mesh]]\nfile = \"a.obj\"\n[material.gold]\nkind = \"metal\"").unwrap();
     assert!(unused.repairs[0].contains("no mesh has a material `gold`"), "{:?}", unused.repairs);
