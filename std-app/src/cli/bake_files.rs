@@ -195,7 +195,7 @@ impl BakeFiles {
         (paths, error_map): (&[PathBuf], Option<&Path>),
     ) -> Result<Self, Failure> {
         if let BakeSubject::Lightmap(lightmap) = subject {
-            return MapFiles::new(paths, error_map, lightmap.is_directional()).map(Self::Map);
+            return MapFiles::new(paths, error_map, lightmap.is_signed()).map(Self::Map);
         }
         check_no_error_map(error_map)?;
         let BakeSubject::Probes(grid) = subject else { return TableFiles::new(paths).map(Self::Tables) };
