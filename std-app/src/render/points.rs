@@ -123,8 +123,8 @@ impl BakeProgress {
 pub struct Baked {
     /// Values, in the order of the points.
     pub values: Vec<PointIrradiance>,
-    /// Fraction of the rays of each point that first meet the back of a surface; 0 where half of the time after
-    /// the first samples did not suffice, empty if not requested.
+    /// Fraction of the rays of each point that first meet the back of a surface; 0 where half of the time
+    /// after the first samples did not suffice, empty if not requested.
     pub back_faces: Vec<f32>,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],

@@ -3,8 +3,8 @@
 //!     halflight bake ../room.toml --lightmap all --size 256x192 --unit white -o assets/map.exr
 //!     halflight bake ../room.toml --probes 6x6x6 --box=-1,0,-1,1,2,1 -o assets/probes.ktx2
 //!
-//! An argument is the name of a PFM file, which gets a picture of 300 x 300 pixels without a window; `room` after it
-//! leaves the sphere out.
+//! An argument is the name of a PFM file, which gets a picture of 300 x 300 pixels without a window; `room`
+//! after it leaves the sphere out.
 
 mod picture;
 
