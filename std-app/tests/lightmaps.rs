@@ -167,6 +167,10 @@ fn a_directional_map_is_linear_in_the_normal() {
     folder.object("bake scene.obj --lightmap all --size 24x16 --spp 256 --directional -o map.exr --json");
     let map = Map::read(&folder, "map.exr");
     assert_eq!(map.texels.len(), 24 * 16 * 4);
+    folder.object(
+        "bake scene.obj --lightmap all --size 24x16 --spp 256 --directional=godot -o g.exr -o g.hdr --json",
+    );
+    let godot = Map::read(&folder, "g.exr");
     // Light comes from the hemisphere above a wall: of a normal that is tilted by θ, (1 + cos θ) / 2 of it.
     let half = PI;
     for side in 0..6 {
@@ -179,6 +183,15 @@ fn a_directional_map_is_linear_in_the_normal() {
         assert!((layer(0) - half).abs() < 0.3, "side {side}: {}", layer(0));
         for (axis, slope) in gradient.into_iter().enumerate() {
             assert!((layer(axis + 1) - slope).abs() < 0.35, "side {side}: {axis} {}", layer(axis + 1));
+        }
+        // Godot has y, z and x, from -1 to 1 as 0 to 1, relative to four times the constant.
+        for [x, y] in texels() {
+            let texel = |map: &Map, layer: usize| map.texel(x, y + 16 * layer)[0];
+            assert!((texel(&godot, 0) - texel(&map, 0)).abs() < 1e-5 * texel(&map, 0));
+            for (of_godot, layer) in [(1, 2), (2, 3), (3, 1)] {
+                let slope = 4.0 * texel(&map, 0) * (2.0 * texel(&godot, of_godot) - 1.0);
+                assert!((slope - texel(&map, layer)).abs() < 1e-4, "side {side}: {slope}");
+            }
         }
     }
 }

@@ -60,7 +60,7 @@ fn harmonics_give_the_irradiance_of_other_normals() {
 fn probes_of_a_furnace_have_its_radiance() {
     let folder = furnace("probes-furnace");
     let object = folder.object("bake scene.obj --probes 3x2x2 --spp 256 -o p.json -o p.csv -o p.ktx2 --json");
-    assert_eq!(object["probes"], serde_json::json!({ "count": 12, "inside": 0 }));
+    assert_eq!(object["probes"], serde_json::json!({ "count": 12, "inside": 0, "open": 0 }));
     assert_eq!(object["points"], 12 * 30);
     let file = json(&folder, "p.json");
     for index in 0..12 {
@@ -125,10 +125,14 @@ fn probes_in_parts_have_the_bits_of_one() {
     let bake = "bake scene.obj --probes 3x4x3 --spp 24 --json";
     folder.object(&format!("{bake} -o whole.json -o whole.csv -o whole.ktx2 --threads 1"));
     for shard in 1..=3 {
-        folder.object(&format!("{bake} --shard {shard}/3 --checkpoint {shard}.bake"));
+        let part = folder.object(&format!("{bake} --shard {shard}/3 --checkpoint {shard}.bake"));
+        // Probes of other shards are not inside bodies.
+        let probes = &part["probes"];
+        assert!(part["half_width"].as_f64().is_some_and(|half_width| half_width < 1.0), "{part}");
+        assert!(probes["inside"] == 0 && probes["open"].as_u64().is_some_and(|open| open > 0), "{probes}");
     }
     let merged = folder.object("merge 3.bake 1.bake 2.bake -o m.json -o m.csv -o m.ktx2 --json");
-    assert_eq!(merged["probes"], serde_json::json!({ "count": 36, "inside": 0 }));
+    assert_eq!(merged["probes"], serde_json::json!({ "count": 36, "inside": 0, "open": 0 }));
     // A bake that ended early goes on.
     for spp in [5, 24] {
         folder.object(&format!(

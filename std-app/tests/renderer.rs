@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use halflight::Renderer;
-use halflight::bake::{BakeSettings, Sensor};
+use halflight::bake::{BakeProgress, BakeSettings, Sensor};
 use halflight::load::{LoadOptions, PartMesh, SceneParts, View, load};
 use halflight::render::{self, Ending, Method, Reconstruct, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
@@ -98,6 +98,27 @@ fn sensors_have_the_coordinates_of_the_files() {
     for (point, exact) in baked.values.iter().zip([2.3084, 1.5558]) {
         assert!((point.value() - exact).abs() <= point.upper - point.lower, "{point:?}, exact {exact}");
     }
+}
+
+#[test]
+fn a_bake_that_is_ended_at_its_first_report_has_values_of_all_points() {
+    let renderer = Renderer::new(square().build().unwrap(), None).unwrap();
+    let sensor = |i: u32| Sensor { position: [0.001 * f64::from(i), 0.0, 0.0], normal: [0.0, 1.0, 0.0] };
+    let points: Vec<_> = (0..600).map(|i| sensor(i).point(renderer.scene())).collect();
+    let interrupt = AtomicBool::new(false);
+    let mut first = None;
+    let mut progress = |progress: &BakeProgress| {
+        first.get_or_insert(progress.samples);
+        // As long again as so far, of twice the samples.
+        assert!(progress.seconds_left.is_some_and(|left| left == progress.seconds));
+        interrupt.store(true, Ordering::Relaxed);
+    };
+    let stop = Stop { spp: Some(8), ..Stop::default() };
+    let settings = BakeSettings { back_faces: true, stop, ..BakeSettings::default() };
+    let baked = renderer.irradiance_with(&points, &settings, &mut progress, &interrupt).unwrap();
+    // Fractions of back faces are counted after the first samples.
+    assert!(baked.is_interrupted && first == Some(4), "{first:?}");
+    assert!(baked.values.iter().all(|value| value.samples == 4 && value.value() > 0.0));
 }
 
 /// A square of side 2 at height 0, seen from a point light at height 2 above its middle.

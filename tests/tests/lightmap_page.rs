@@ -7,8 +7,8 @@ use crate::server::{THREE, package, serve};
 use core::f64::consts::PI;
 use core::sync::atomic::AtomicBool;
 use halflight::bake::{
-    BakeSettings, Baked, Lightmap, LightmapSettings, Probe, ProbeFormat, ProbeGrid, ProbeSettings, Quantity,
-    Sensor, irradiance, write_probes,
+    BakeSettings, Baked, DirectionalLayout, Lightmap, LightmapSettings, Probe, ProbeFormat, ProbeGrid,
+    ProbeSettings, Quantity, Sensor, irradiance, write_probes,
 };
 use halflight::compare::compare;
 use halflight::load::{LoadOptions, LoadedScene, load};
@@ -52,18 +52,32 @@ fn shown(browser: &str, folder: &Path, port: u16, query: &str) -> (Image, Probe)
     let errors: Vec<_> = console.iter().filter(|line| line.contains("rror")).collect();
     assert!(errors.is_empty(), "{errors:?}");
     let side: u32 = noted(&document, "size").parse().unwrap();
-    let bytes: Vec<u8> = noted(&document, "pixels").split(' ').map(|byte| byte.parse().unwrap()).collect();
-    let linear = |rgba: &[u8]| [0, 1, 2].map(|channel| from_srgb(f32::from(rgba[channel]) / 255.0));
-    let rows = bytes.chunks(4 * side as usize).rev();
-    let pixels = rows.flat_map(|row| row.chunks(4).map(linear)).collect();
+    let picture = linear_picture(noted(&document, "pixels"), side);
     let harmonics: Vec<f32> =
         noted(&document, "harmonics").split(' ').map(|number| number.parse().unwrap()).collect();
     let coefficients = core::array::from_fn(|i| Rgb::from_slice(&harmonics[3 * i..]));
-    (Image { width: side, height: side, pixels }, Probe { coefficients, ..Probe::default() })
+    (picture, Probe { coefficients, ..Probe::default() })
+}
+
+/// The linear picture of bytes of R, G, B and A, in rows from the bottom.
+pub(crate) fn linear_picture(bytes: &str, side: u32) -> Image {
+    let bytes: Vec<u8> = bytes.split(' ').map(|byte| byte.parse().unwrap()).collect();
+    let linear = |rgba: &[u8]| [0, 1, 2].map(|channel| from_srgb(f32::from(rgba[channel]) / 255.0));
+    let rows = bytes.chunks(4 * side as usize).rev();
+    Image { width: side, height: side, pixels: rows.flat_map(|row| row.chunks(4).map(linear)).collect() }
+}
+
+/// Our own picture of a scene.
+pub(crate) fn picture_of(loaded: &LoadedScene, [width, height]: [u32; 2]) -> Image {
+    let stop = Stop { spp: Some(64), ..Stop::default() };
+    let settings = Settings { width, height, stop, method: Some(Method::Path), ..Settings::default() };
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    render(&scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap().image
 }
 
 /// Irradiances of `points` by so many samples.
-fn bake(loaded: &LoadedScene, points: &[IrradiancePoint], samples: u32) -> Baked {
+pub(crate) fn bake(loaded: &LoadedScene, points: &[IrradiancePoint], samples: u32) -> Baked {
     let stop = Stop { spp: Some(samples), ..Stop::default() };
     let settings = BakeSettings { stop, back_faces: true, ..BakeSettings::default() };
     let views = loaded.views();
@@ -71,24 +85,32 @@ fn bake(loaded: &LoadedScene, points: &[IrradiancePoint], samples: u32) -> Baked
     irradiance(&scene, points, &settings, &mut |_| {}, &AtomicBool::new(false)).unwrap()
 }
 
-/// Writes the lightmap and the probes of the page into `folder`.
-fn write_light(loaded: &LoadedScene, folder: &Path) {
+/// Writes the probes of a room into `folder`, and a lightmap by the name of its file. Returns the probes.
+/// The lightmap is a directional one of Godot if its file has such a name.
+pub(crate) fn write_light(
+    loaded: &LoadedScene,
+    folder: &Path,
+    (name, quantity): (&str, Quantity),
+) -> Vec<Probe> {
     let mut budget = Budget::new(None);
-    let size = [160, 120];
-    let settings = LightmapSettings { subject: None, size, points: 1, padding: 4, directional: false };
+    let (size, directional) = ([160, 120], name.starts_with("directional"));
+    let layout = DirectionalLayout::Godot;
+    let settings = LightmapSettings { subject: None, size, points: 1, padding: 4, directional, layout };
     let lightmap = Lightmap::new(loaded, settings, &mut budget, &mut |_| true).unwrap();
-    let map = lightmap.map(&bake(loaded, lightmap.points(), 128), Quantity::Irradiance, &|| true);
-    std::fs::write(folder.join("map.exr"), map.encode(Format::Exr).unwrap()).unwrap();
+    let map = lightmap.map(&bake(loaded, lightmap.points(), 128), quantity, &|| true);
+    let format = Format::of(Path::new(name)).unwrap();
+    std::fs::write(folder.join(name), map.encode(format).unwrap()).unwrap();
     let settings = ProbeSettings { size: [6; 3], bounds: None, cubes: false };
     let grid = ProbeGrid::new(loaded, settings, &mut budget).unwrap();
     let probes = grid.probes(&bake(loaded, grid.points(), 256));
     let mut file = Vec::new();
     write_probes(&mut file, ProbeFormat::Json, &grid, &probes).unwrap();
     std::fs::write(folder.join("probes.json"), file).unwrap();
+    probes
 }
 
 /// Pixels of the sphere of the page and its normals there.
-fn sphere_pixels(side: u32) -> Vec<(usize, Vec3)> {
+pub(crate) fn sphere_pixels(side: u32) -> Vec<(usize, Vec3)> {
     let (eye, target, centre, radius) =
         (DVec3::new(0.0, 1.0, 3.6), DVec3::new(0.0, 0.95, 0.0), DVec3::new(0.5, 0.45, 0.25), 0.3);
     let along = (target - eye).normalize();
@@ -119,17 +141,12 @@ fn three_js_shows_the_lightmap_and_the_probes_as_we_do() {
     std::fs::copy(scene.join("room.obj"), folder.0.join("room.obj")).unwrap();
     let options = LoadOptions { keeps_texcoords: true, ..LoadOptions::default() };
     let loaded = load(&scene.join("room.toml"), &options).unwrap();
-    write_light(&loaded, &folder.0);
+    write_light(&loaded, &folder.0, ("map.exr", Quantity::Irradiance));
     let (port, _posted) = serve(folder.0.clone(), &[("three", three)]);
 
     let (room, _) = shown(browser, &folder.0, port, "?sphere=off");
     let (width, height) = (room.width, room.height);
-    let stop = Stop { spp: Some(64), ..Stop::default() };
-    let settings = Settings { width, height, stop, method: Some(Method::Path), ..Settings::default() };
-    let views = loaded.views();
-    let scene = views.scene(loaded.camera_or_default());
-    let own = render(&scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap().image;
-    let flip = compare(&room, &own).unwrap().flip;
+    let flip = compare(&room, &picture_of(&loaded, [width, height])).unwrap().flip;
     println!("room in the browser: FLIP {flip:.4}");
     assert!(flip < MOST_FLIP, "{flip}");
 

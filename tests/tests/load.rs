@@ -86,6 +86,7 @@ fn what_is_repaired_is_said_once() {
     let scene = repairs(&format!("{SQUARE}f 1 1 2\nf 1 2 3\n"), "without area");
     assert_eq!(scene.triangles.len(), 1);
     repairs(&format!("{SQUARE}vt 0 0\nf 1/1 2 3\n"), "texture coordinate in only some corners");
+    repairs(&format!("{SQUARE}vt 0 0\nf 1/ 2 3\n"), "without an index after its last slash");
     let scene = repairs(&format!("{SQUARE}vn 0 0 1\nf 1//1 2 3\n"), "normal in only some corners");
     assert!(scene.normals.iter().all(|&n| n == [0.0; 3]));
     let scene = repairs(&format!("{SQUARE}vn 0 0 0\nf 1//1 2//1 3//1\n"), "zero normal");
@@ -302,6 +303,7 @@ fn a_scene_file_that_is_wrong_says_where() {
     wrong(&format!("{light}intensity = 1"), 4, "too small");
     wrong("[environment]\nto_world = [[2,0,0,0],[0,1,0,0],[0,0,1,0]]", 2, "angles and lengths");
     wrong("[environment]\nmap = \"sky.exr\"", 2, "there is no file");
+    wrong("[environment]\nmap = \"a.obj\"", 2, "a.obj cannot be read: it is in no format");
     wrong("[render]\nsamples = 4", 2, "unknown field `samples`");
     let unused = toml("[[mesh]]\nfile = \"a.obj\"\n[material.gold]\nkind = \"metal\"").unwrap();
     assert!(unused.repairs[0].contains("no mesh has a material `gold`"), "{:?}", unused.repairs);

@@ -17,6 +17,7 @@ mod environment_visibility;
 mod faint_caustics;
 mod far;
 mod furnace;
+mod godot_page;
 mod golden;
 mod hall;
 mod hidden_light;

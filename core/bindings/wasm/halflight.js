@@ -509,6 +509,7 @@ function describe(halflight, take, at, description, texels) {
             .f32(light.innerDegrees, light.outerDegrees);
     });
     const { eye = [0, 0, 1], target = [0, 0, 0], up = [0, 1, 0], fov = 40, lensRadius = 0, focusDistance = 1 } = camera;
+    if (!(fov > 0 && fov <= 178)) throw new RangeError(`halflight: a fov is above 0 and at most 178 degrees, and not ${fov}`);
     new Structure(view, mesh.at)
         .u32(ofMaterials, materials.length, ofTextures, textures.length, ofLights, lights.length)
         .f32(...triple(environment?.radiance ?? environment)).u32(index(environment?.texture))

@@ -1,7 +1,7 @@
 ## A room with its lightmap, and a sphere lit by a probe. Run the project in this folder, after
-##     halflight bake ../room.toml --lightmap all --size 256x192 --unit white -o map.exr
+##     halflight bake ../room.toml --lightmap all --size 256x192 --unit white -o map.pfm
 ##     halflight bake ../room.toml --probes 6x6x6 -o probes.json
-## and with ../room.obj copied beside this script.
+## and with ../room.obj copied beside this script. The file of --directional=godot is directional.pfm.
 extends Node3D
 
 # Reflectances of room.mtl, linear.
@@ -24,7 +24,12 @@ void fragment() {
 		+ 0.25 * (1.092548 * (m.x * m.y * coefficients[4] + m.y * m.z * coefficients[5] + m.x * m.z * coefficients[7])
 		+ 0.315392 * (3.0 * m.z * m.z - 1.0) * coefficients[6]
 		+ 0.546274 * (m.x * m.x - m.y * m.y) * coefficients[8]);
-	ALBEDO = reflectance * light;
+	light = max(reflectance * light, vec3(0.0));
+	// The Compatibility renderer takes colours of shaders to be encoded.
+	if (OUTPUT_IS_SRGB) {
+		light = mix(12.92 * light, 1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, light));
+	}
+	ALBEDO = light;
 }"""
 
 
@@ -35,16 +40,22 @@ func _ready() -> void:
 	room.gi_mode = GeometryInstance3D.GI_MODE_STATIC
 	add_child(room)
 
-	# One layer of one texture, which all triangles of the mesh share.
-	var image := Image.load_from_file(ProjectSettings.globalize_path("res://map.exr"))
-	image.convert(Image.FORMAT_RGBAH)
+	# One texture, which all triangles of the mesh share: of one layer, or of four if the map is directional.
+	var is_directional := FileAccess.file_exists("res://directional.pfm")
+	var map := read_pfm("res://directional.pfm" if is_directional else "res://map.pfm")
+	map.convert(Image.FORMAT_RGBAH)
+	var count := 4 if is_directional else 1
+	var size := Vector2i(map.get_width(), map.get_height() / count)
+	var images: Array[Image] = []
+	for layer in count:
+		images.append(map.get_region(Rect2i(Vector2i(0, layer * size.y), size)))
 	var texture := Texture2DArray.new()
-	texture.create_from_images([image])
+	texture.create_from_images(images)
 	var light := LightmapGI.new()
 	add_child(light)
 	var data := LightmapGIData.new()
 	data.set_lightmap_textures([texture])
-	data.set_uses_spherical_harmonics(false)
+	data.set_uses_spherical_harmonics(is_directional)
 	data.add_user(light.get_path_to(room), Rect2(0, 0, 1, 1), 0, -1)
 	# Outside of its bounds a lightmap is not drawn.
 	RenderingServer.lightmap_set_probe_bounds(data.get_rid(), room.get_aabb().grow(1.0))
@@ -52,6 +63,19 @@ func _ready() -> void:
 
 	add_child(sphere())
 	$Camera3D.look_at_from_position(Vector3(0, 1, 3.6), Vector3(0, 0.95, 0))
+
+
+## A map of three floats a texel. Godot without threads, as in browsers, reads no EXR.
+func read_pfm(path: String) -> Image:
+	var file := FileAccess.open(path, FileAccess.READ)
+	file.get_line()
+	var size := file.get_line().split(" ")
+	file.get_line()
+	var width := size[0].to_int()
+	var height := size[1].to_int()
+	var image := Image.create_from_data(width, height, false, Image.FORMAT_RGBF, file.get_buffer(12 * width * height))
+	image.flip_y()
+	return image
 
 
 ## The surfaces of an OBJ file, one for each material. v goes down here, and fronts are clockwise.

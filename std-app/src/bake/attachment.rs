@@ -137,6 +137,7 @@ fn numbers_of<T: bytemuck::Pod>(bytes: &[u8]) -> Option<Vec<T>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bake::lightmap::DirectionalLayout;
 
     #[test]
     fn bytes_give_their_subject_back() {
@@ -160,8 +161,15 @@ mod tests {
 
     #[test]
     fn texels_without_a_chart_and_seams_outside_are_refused() {
-        let settings =
-            LightmapSettings { subject: None, size: [2, 1], points: 1, padding: 0, directional: false };
+        let layout = DirectionalLayout::Linear;
+        let settings = LightmapSettings {
+            subject: None,
+            size: [2, 1],
+            points: 1,
+            padding: 0,
+            directional: false,
+            layout,
+        };
         let points = vec![IrradiancePoint::default(); 1];
         let of = |texel: u32, far: f64| {
             let (charts, texels) = (vec![EMPTY, 0], vec![texel]);

@@ -8,7 +8,7 @@ use super::map::{Fetch, LightMap, Texel};
 use super::raster::{self, EMPTY, Raster, Watch, weights};
 use super::seams::{self, Seam, seams};
 use super::table::Quantity;
-use super::tilted::{linear, with_tilted};
+use super::tilted::{bounded, linear, with_tilted};
 use crate::load::LoadedScene;
 use crate::memory::{Budget, Shortage};
 use crate::render::Baked;
@@ -39,6 +39,19 @@ pub struct LightmapSettings {
     pub padding: u32,
     /// True if the irradiance of each texel is a linear function of the normal, from four normals.
     pub directional: bool,
+    /// Layers of a directional map.
+    #[serde(default)]
+    pub layout: DirectionalLayout,
+}
+
+/// Layers of a directional map, one below the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DirectionalLayout {
+    /// a, and b along x, y and z, of the irradiance a + b·n by the normal n.
+    #[default]
+    Linear,
+    /// Those of Godot: a, and ½ + b / (8 a) along y, z and x, with |b| at most 2 a.
+    Godot,
 }
 
 /// Texels of a lightmap and their points.
@@ -212,9 +225,9 @@ impl Lightmap {
         self.charts.iter().zip(&map.texels).filter(|pair| is_filled(*pair)).count()
     }
 
-    /// True if values are linear functions of the normal.
-    pub fn is_directional(&self) -> bool {
-        self.settings.directional
+    /// True if layers have values below 0.
+    pub fn is_signed(&self) -> bool {
+        self.settings.is_signed()
     }
 
     /// Number of charts.
@@ -243,7 +256,8 @@ impl Lightmap {
             let fetch = match (values, points) {
                 ([a, b, c, d], [e, f, g, h]) => {
                     let irradiances = [a, b, c, d].map(|value| value.irradiance.to_array());
-                    directional([e, f, g, h].map(|point| point.normal.into()), irradiances)
+                    let normals = [e, f, g, h].map(|point| point.normal.into());
+                    directional(normals, irradiances, self.settings.layout)
                 }
                 _ => [values[0].irradiance.to_array(); 4],
             };
@@ -253,6 +267,9 @@ impl Lightmap {
         }
         map.divide(&counts, quantity.scale());
         self.spread(&mut map, &counts, watch);
+        if self.settings.directional && self.settings.layout == DirectionalLayout::Godot {
+            map.encode_slopes();
+        }
         map
     }
 
@@ -289,6 +306,11 @@ impl Lightmap {
 }
 
 impl LightmapSettings {
+    /// True if layers have values below 0.
+    pub fn is_signed(&self) -> bool {
+        self.directional && self.layout == DirectionalLayout::Linear
+    }
+
     pub(super) fn layers(&self) -> usize {
         if self.directional { 4 } else { 1 }
     }
@@ -320,10 +342,14 @@ fn chosen<'a>(
 }
 
 /// Constant and gradient of irradiance by its values at the normals of [`with_tilted`].
-fn directional(normals: [Vec3; 4], irradiances: [[f32; 3]; 4]) -> Fetch {
+fn directional(normals: [Vec3; 4], irradiances: [[f32; 3]; 4], layout: DirectionalLayout) -> Fetch {
     let mut fetch = Fetch::default();
     for channel in 0..3 {
-        let (constant, slope) = linear(normals, irradiances.map(|irradiance| irradiance[channel]));
+        let values = irradiances.map(|irradiance| irradiance[channel]);
+        let (constant, slope) = match layout {
+            DirectionalLayout::Linear => linear(normals, values),
+            DirectionalLayout::Godot => bounded(normals[0], values[0], linear(normals, values).1),
+        };
         let all = [constant, slope.x, slope.y, slope.z];
         fetch.iter_mut().zip(all).for_each(|(layer, value)| layer[channel] = value);
     }

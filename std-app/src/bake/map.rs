@@ -62,6 +62,18 @@ impl LightMap {
         }
     }
 
+    /// Slopes along x, y and z become ½ + slope / (8 × constant) along y, z and x.
+    pub(super) fn encode_slopes(&mut self) {
+        let [constant, slopes @ ..] = &mut self.layers[..] else { return };
+        for (slope, constant) in slopes.iter_mut().flat_map(|layer| layer.iter_mut().zip(&*constant)) {
+            for (slope, constant) in slope.iter_mut().zip(constant) {
+                let ratio = if *constant > 0.0 { *slope / (8.0 * constant) } else { 0.0 };
+                *slope = (0.5 + ratio).clamp(0.0, 1.0);
+            }
+        }
+        slopes.rotate_left(1);
+    }
+
     /// Gives `texel` the mean of others.
     pub(super) fn take(&mut self, texel: usize, from: &[usize]) {
         let each = 1.0 / from.len() as f32;
@@ -83,7 +95,7 @@ impl LightMap {
     /// # Errors
     /// A PNG, whose values are no light, or an HDR of gradients, which may be negative; too many texels.
     pub fn encode(&self, format: Format) -> Result<Vec<u8>, FileError> {
-        check(format, self.layers.len() > 1)?;
+        check(format, self.layers.iter().flatten().flatten().any(|value| *value < 0.0))?;
         self.encode_pixels(self.layers.concat(), format)
     }
 

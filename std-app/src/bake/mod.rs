@@ -21,7 +21,7 @@ mod tilted;
 pub use crate::render::{BakeProgress, BakeSettings, Baked};
 pub use attachment::{BakeSubject, attachment};
 pub use halflight_core::IrradiancePoint;
-pub use lightmap::{Lightmap, LightmapError, LightmapSettings};
+pub use lightmap::{DirectionalLayout, Lightmap, LightmapError, LightmapSettings};
 pub use map::{LightMap, Texel, check as check_format};
 pub use merge::{MergedBake, is_bake, merge};
 pub use points::{Sensor, read_sensors, vertices};

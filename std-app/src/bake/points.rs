@@ -36,8 +36,12 @@ pub fn read_sensors(path: &Path, most: usize) -> Result<Vec<Sensor>, FileError> 
     sensors_of(&String::from_utf8_lossy(&bytes), path)
 }
 
-/// Sensors of `text`, one a line.
+/// Characters of a word that a message quotes: files of bytes have words without an end.
+const QUOTED: usize = 24;
+
+/// Sensors of `text`, one a line. Editors may have put a byte order mark at its start.
 fn sensors_of(text: &str, path: &Path) -> Result<Vec<Sensor>, FileError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut sensors = Vec::new();
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -60,7 +64,8 @@ fn sensor_of(line: &str) -> Result<Sensor, String> {
     let mut numbers = Vec::with_capacity(6);
     for field in fields {
         let number = field.parse::<f64>().ok().filter(|number| number.is_finite());
-        numbers.push(number.ok_or_else(|| format!("`{field}` is not a number"))?);
+        let quoted = || field.chars().take(QUOTED).collect::<String>();
+        numbers.push(number.ok_or_else(|| format!("`{}` is not a number", quoted()))?);
     }
     let numbers: [f64; 6] = numbers
         .try_into()
@@ -115,6 +120,7 @@ mod tests {
     fn lines_of_six_numbers_are_sensors() {
         let sensors = read("# desk\n0 0.8 1 0 1 0\n\n 1,2,3;\t0 0 -2e0 \r\n").unwrap();
         assert_eq!(sensors[0], Sensor { position: [0.0, 0.8, 1.0], normal: [0.0, 1.0, 0.0] });
+        assert_eq!(sensors, read("\u{feff}0 0.8 1 0 1 0\n1 2 3 0 0 -2\n").unwrap());
         assert_eq!(sensors[1], Sensor { position: [1.0, 2.0, 3.0], normal: [0.0, 0.0, -2.0] });
     }
 
@@ -126,6 +132,7 @@ mod tests {
             ("0 0 inf 0 1 0", "line 1: `inf` is not a number"),
             ("0 0 0 0 0 0", "line 1: the normal has no length"),
             ("# nothing\n", "has no sensor"),
+            (&"x".repeat(1000), "line 1: `xxxxxxxxxxxxxxxxxxxxxxxx` is not a number"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(message), "{error}");

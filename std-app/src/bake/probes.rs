@@ -106,6 +106,12 @@ impl ProbeGrid {
         })
     }
 
+    /// True for each probe that has samples: others are those of other shards, or of a bake that was ended.
+    pub fn sampled(&self, baked: &Baked) -> Vec<bool> {
+        let bundles = baked.values.chunks(self.normals.len());
+        bundles.map(|values| values.iter().all(|value| value.samples > 0)).collect()
+    }
+
     /// The probes by the irradiances of their points.
     pub fn probes(&self, baked: &Baked) -> Vec<Probe> {
         let count = self.normals.len();
@@ -114,7 +120,8 @@ impl ProbeGrid {
         let mut probes: Vec<Probe> = bundles.map(|(values, shares)| self.probe(values, shares)).collect();
         // Rooms whose walls show their backs have no other probes.
         if probes.iter().all(|probe| !probe.is_valid) {
-            probes.iter_mut().for_each(|probe| probe.is_valid = true);
+            let sampled = self.sampled(baked);
+            probes.iter_mut().zip(sampled).for_each(|(probe, is_sampled)| probe.is_valid = is_sampled);
         }
         let mut is_known: Vec<bool> = probes.iter().map(|probe| probe.is_valid).collect();
         let take = |cell: usize, from: &[usize]| {

@@ -228,9 +228,9 @@ impl Bake {
             let [tiles, finished] = progress.tiles;
             let within = self.error.map_or(String::new(), |_| format!(", {finished} of {tiles} tiles"));
             let seconds = readable_seconds(progress.seconds);
-            let text = match progress.samples {
-                0 => format!("fractions of back faces, {seconds}"),
-                samples => format!("{samples} samples per point{within}, {seconds}"),
+            let text = match progress.counting {
+                Some(part) => format!("fractions of back faces, {:.0} %, {seconds}", 100.0 * part),
+                None => format!("{} samples per point{within}, {seconds}", progress.samples),
             };
             let state =
                 json!({ "samples": progress.samples, "tiles": { "all": tiles, "finished": finished } });

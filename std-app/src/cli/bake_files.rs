@@ -8,8 +8,8 @@ use core::fmt;
 use core::sync::atomic::Ordering;
 use core::time::Duration;
 use halflight::bake::{
-    BakeSubject, Baked, Lightmap, MergedBake, ProbeFormat, ProbeGrid, Quantity, Sensor, TableFormat, Texel,
-    check_format, write_probes, write_table,
+    BakeSubject, Baked, Lightmap, MergedBake, Probe, ProbeFormat, ProbeGrid, Quantity, Sensor, TableFormat,
+    Texel, check_format, write_probes, write_table,
 };
 use halflight::save::{FileError, Format, Patience};
 use serde_json::{Value, json};
@@ -165,10 +165,15 @@ impl ProbeFiles {
         for (path, format) in &self.0 {
             outputs.save_table(path, |out| write_probes(out, *format, grid, &probes));
         }
-        let (count, inside) = (probes.len(), probes.iter().filter(|probe| !probe.is_valid).count());
+        let count = probes.len();
+        let sampled = grid.sampled(baked);
+        let open = sampled.iter().filter(|is_sampled| !**is_sampled).count();
+        let is_inside = |(probe, is_sampled): &(&Probe, &bool)| !probe.is_valid && **is_sampled;
+        let inside = probes.iter().zip(&sampled).filter(is_inside).count();
+        let without = if open > 0 { format!(", {open} without samples") } else { String::new() };
         Saved {
-            text: format!("{count} probes, {inside} inside bodies; "),
-            entries: vec![("probes", json!({ "count": count, "inside": inside }))],
+            text: format!("{count} probes, {inside} inside bodies{without}; "),
+            entries: vec![("probes", json!({ "count": count, "inside": inside, "open": open }))],
         }
     }
 }
@@ -190,7 +195,7 @@ impl BakeFiles {
         (paths, error_map): (&[PathBuf], Option<&Path>),
     ) -> Result<Self, Failure> {
         if let BakeSubject::Lightmap(lightmap) = subject {
-            return MapFiles::new(paths, error_map, lightmap.is_directional()).map(Self::Map);
+            return MapFiles::new(paths, error_map, lightmap.is_signed()).map(Self::Map);
         }
         check_no_error_map(error_map)?;
         let BakeSubject::Probes(grid) = subject else { return TableFiles::new(paths).map(Self::Tables) };

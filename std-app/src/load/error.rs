@@ -30,6 +30,24 @@ impl LoadError {
     }
 }
 
+/// A place in a text file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TextPlace {
+    /// The file.
+    pub file: PathBuf,
+    /// Line, from 1.
+    pub line: u32,
+    /// Column in characters, from 1.
+    pub column: u32,
+}
+
+impl TextPlace {
+    /// An error at this place.
+    pub fn error(&self, problem: impl Into<String>, help: impl Into<String>) -> LoadError {
+        LoadError { column: self.column, ..LoadError::at(&self.file, self.line, problem, help) }
+    }
+}
+
 impl fmt::Display for LoadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.file.display())?;

@@ -1,6 +1,7 @@
 //! Texture statements: `[-option values]... file name with blanks`. Options may follow the name too, and
 //! names may resemble options or contain ` #`; the existing file decides among the readings.
 
+use super::error::TextPlace;
 use super::files::{Found, Lookup};
 use super::name::{Name, unquoted, without_comments};
 use super::notes::Notes;
@@ -19,6 +20,8 @@ pub struct Map {
     pub found: Option<PathBuf>,
     /// Options of the reading that names the file.
     pub options: MapOptions,
+    /// The place in a scene file that names it.
+    pub named: Option<TextPlace>,
 }
 
 /// The number that a map takes from a texel.
@@ -70,6 +73,11 @@ impl Map {
     /// A map of a located file.
     pub(super) fn of_file(name: &str, found: PathBuf) -> Self {
         Self { operand: name.into(), found: Some(found), ..Self::default() }
+    }
+
+    /// The located file, and the place in a scene file that names it.
+    pub(super) fn required(&self) -> Option<(PathBuf, TextPlace)> {
+        self.found.clone().zip(self.named.clone())
     }
 
     /// The statement with this operand; `None` if it names no file.

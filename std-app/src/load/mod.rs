@@ -313,7 +313,7 @@ impl SceneBuilder {
         let maps = self.materials.iter().flat_map(|mtl| mtl.maps.values()).chain(of_environment());
         let files = maps.filter_map(file).filter(|_| options.textures);
         let required = self.overrides.values().flat_map(|change| change.material().maps.values());
-        let required = required.chain(of_environment()).filter_map(file).collect();
+        let required = required.chain(of_environment()).filter_map(Map::required).collect();
         let given = core::mem::take(&mut self.given_textures);
         let set = given.decode(files, &required, &self.embedded, &mut self.budget, &mut self.notes)?;
         self.embedded.clear();

@@ -4,7 +4,7 @@
 mod combined;
 
 use super::bytes::Bytes;
-use super::error::LoadError;
+use super::error::{LoadError, TextPlace};
 use super::map::{Channel, Map, MapOptions};
 use super::notes::Notes;
 use super::relief::{self, Relief};
@@ -14,7 +14,7 @@ use crate::picture::{self, FileError, Info, Picture, Samples, fail};
 use halflight_core::scene::{Texture, TextureId, TextureTransform, Wrap};
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Number of the alpha channel.
@@ -57,11 +57,12 @@ impl TextureSet {
     /// the budget.
     ///
     /// # Errors
-    /// A `required` picture that is unreadable or too large; others are left out with a note.
+    /// A picture that is unreadable or too large and `required` by a place in a scene file; others are left
+    /// out with a note.
     pub(super) fn decode(
         mut self,
         files: impl Iterator<Item = PathBuf>,
-        required: &BTreeSet<PathBuf>,
+        required: &BTreeMap<PathBuf, TextPlace>,
         embedded: &Embedded,
         budget: &mut Budget,
         notes: &mut Notes,
@@ -93,7 +94,7 @@ impl TextureSet {
     fn decode_batch(
         &mut self,
         batch: &[(&PathBuf, usize)],
-        required: &BTreeSet<PathBuf>,
+        required: &BTreeMap<PathBuf, TextPlace>,
         embedded: &Embedded,
         budget: &mut Budget,
         notes: &mut Notes,
@@ -108,7 +109,7 @@ impl TextureSet {
                 Err(why) => leave_out(file, &why, required, notes)?,
                 Ok(mut picture) => {
                     texture::note(&mut picture, file, notes);
-                    budget.take(picture.bytes()).map_err(|why| refusal(file, &why))?;
+                    budget.take(picture.bytes()).map_err(|why| refusal(file, &why, required.get(*file)))?;
                     self.by_file.insert((*file).clone(), self.pictures.len());
                     self.pictures.push(picture);
                 }
@@ -340,17 +341,20 @@ fn measure(file: &Path, embedded: &Embedded, most: usize) -> Result<usize, FileE
 fn leave_out(
     file: &Path,
     why: &FileError,
-    required: &BTreeSet<PathBuf>,
+    required: &BTreeMap<PathBuf, TextPlace>,
     notes: &mut Notes,
 ) -> Result<(), LoadError> {
-    if required.contains(file) {
-        return Err(refusal(file, why));
+    if let Some(place) = required.get(file) {
+        return Err(refusal(file, why, Some(place)));
     }
     notes.add(1, format!("texture {} cannot be read ({why}): left out", file.display()));
     Ok(())
 }
 
-fn refusal(file: &Path, why: &dyn core::fmt::Display) -> LoadError {
+fn refusal(file: &Path, why: &dyn core::fmt::Display, named: Option<&TextPlace>) -> LoadError {
     let help = "the scene file names this picture, so it is not left out";
-    LoadError::of_file(file, format!("this picture cannot be read: {why}"), help)
+    match named {
+        Some(place) => place.error(format!("the picture {} cannot be read: {why}", file.display()), help),
+        None => LoadError::of_file(file, format!("this picture cannot be read: {why}"), ""),
+    }
 }

@@ -10,8 +10,9 @@ use super::{Checkpoint, RenderError, Stop};
 use crate::file_error::FileError;
 use crate::save::Patience;
 use core::sync::atomic::AtomicBool;
+use halflight_core::bsdf::All;
 use halflight_core::findings::Findings;
-use halflight_core::memory::{Arena, Footprint};
+use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::method::{Shard, rays_per_second};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Counters, SceneContext};
@@ -94,21 +95,26 @@ impl Default for BakeSettings {
 /// Progress of a bake.
 #[derive(Clone, Copy, Debug)]
 pub struct BakeProgress {
-    /// Samples of the least sampled point; 0 while fractions of back faces are counted.
+    /// Samples of the least sampled point.
     pub samples: u32,
+    /// Part of the points whose fractions of back faces are counted, until all are.
+    pub counting: Option<f64>,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],
     /// Seconds so far.
     pub seconds: f64,
-    /// Seconds left of the time limit.
+    /// Seconds left, by the time limit or by the number of samples.
     pub seconds_left: Option<f64>,
 }
 
 impl BakeProgress {
     fn after(start: Instant, settings: &BakeSettings, samples: u32, tiles: [usize; 2]) -> Self {
         let seconds = start.elapsed().as_secs_f64();
-        let seconds_left = settings.stop.seconds.map(|limit| (limit - seconds).max(0.0));
-        Self { samples, tiles, seconds, seconds_left }
+        let of_limit = settings.stop.seconds.map(|limit| (limit - seconds).max(0.0));
+        let most = settings.stop.spp.filter(|_| samples > 0);
+        let of_samples = most.map(|most| seconds * (f64::from(most) / f64::from(samples) - 1.0).max(0.0));
+        let seconds_left = of_limit.into_iter().chain(of_samples).reduce(f64::min);
+        Self { samples, counting: None, tiles, seconds, seconds_left }
     }
 }
 
@@ -117,8 +123,8 @@ impl BakeProgress {
 pub struct Baked {
     /// Values, in the order of the points.
     pub values: Vec<PointIrradiance>,
-    /// Fraction of the rays of each point that first meet the back of a surface; 0 where half of the time did
-    /// not suffice, empty if not requested.
+    /// Fraction of the rays of each point that first meet the back of a surface; 0 where half of the time
+    /// after the first samples did not suffice, empty if not requested.
     pub back_faces: Vec<f32>,
     /// Tiles of near points, and those within the error.
     pub tiles: [usize; 2],
@@ -141,11 +147,12 @@ impl Baked {
         (sum / self.values.len().max(1) as f64).to_array()
     }
 
-    /// Median of the half-widths of the intervals relative to the value; `None` where most points are black
-    /// or have no interval.
+    /// Median of the half-widths of the intervals of points with samples, relative to the value; `None` where
+    /// most of them are black or have no interval.
     pub fn median_half_width(&self) -> Option<f64> {
         let relative = |value: &PointIrradiance| (value.upper - value.value()) / value.value();
-        let mut widths: Vec<f32> = self.values.iter().map(relative).collect();
+        let sampled = self.values.iter().filter(|value| value.samples > 0);
+        let mut widths: Vec<f32> = sampled.map(relative).collect();
         widths.sort_unstable_by(f32::total_cmp);
         let median = widths.get(widths.len() / 2).copied()?;
         median.is_finite().then_some(median.into())
@@ -171,7 +178,7 @@ struct Kept<'a> {
     identity: &'a Identity,
     points: usize,
     goal: Goal,
-    back_faces: &'a [f32],
+    back_faces: Vec<f32>,
     /// Start of this run, and seconds of the earlier ones.
     start: Instant,
     before: f64,
@@ -183,13 +190,14 @@ struct Kept<'a> {
 impl<'a> Kept<'a> {
     fn new(
         settings: &'a BakeSettings,
-        (identity, points, goal, back_faces): (&'a Identity, usize, Goal, &'a [f32]),
+        (identity, points, goal): (&'a Identity, usize, Goal),
         (start, before): (Instant, f64),
         interrupt: &'a AtomicBool,
     ) -> Self {
         let path = settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path());
         let file = RewrittenFile::in_file(path);
         let saved = Instant::now();
+        let back_faces = vec![0.0; if settings.back_faces { points } else { 0 }];
         Self { file, settings, identity, points, goal, back_faces, start, before, saved, interrupt }
     }
 
@@ -202,11 +210,11 @@ impl<'a> Kept<'a> {
         }
     }
 
-    /// Writes the file. Returns why it could not.
-    fn finish(mut self, renderer: &IrradianceRenderer) -> Option<FileError> {
+    /// Writes the file. Returns why it could not, and the fractions of back faces.
+    fn finish(mut self, renderer: &IrradianceRenderer) -> (Option<FileError>, Vec<f32>) {
         let patience = Patience { since: Instant::now(), interrupt: self.interrupt };
         self.write(renderer, Some(patience));
-        self.file.failed()
+        (self.file.failed(), self.back_faces)
     }
 
     fn write(&mut self, renderer: &IrradianceRenderer, last: Option<Patience>) {
@@ -214,7 +222,7 @@ impl<'a> Kept<'a> {
         if renderer.film().points.is_empty() {
             return;
         }
-        let beside = Beside { back_faces: self.back_faces, attached: &self.settings.attached };
+        let beside = Beside { back_faces: &self.back_faces, attached: &self.settings.attached };
         let seconds = self.before + self.start.elapsed().as_secs_f64();
         let header = || BakeHeader::new(self.identity, (self.points, beside, self.goal), renderer, seconds);
         let write =
@@ -230,6 +238,22 @@ impl<'a> Kept<'a> {
 fn grown(samples: u32, seconds: f64) -> u32 {
     let growth = (LONGEST_ROUND / seconds.max(1e-6)).clamp(0.125, 1.0);
     samples.saturating_add((f64::from(samples) * growth).ceil() as u32).min(1 << 30)
+}
+
+/// Counts the fractions of back faces of `points`, in half of the time that is left: the rest is for samples.
+fn count_back_faces(
+    context: &SceneContext<All>,
+    (points, fractions): (&[IrradiancePoint], &mut [f32]),
+    (workers, scratch): (&Workers, &mut [Vec<Line>]),
+    report: &mut dyn FnMut(f64),
+) -> Result<(), RenderError> {
+    let end = End::Round(workers.deadline.after(0.5));
+    let chunks = points.chunks(BACK_FACES_AT_ONCE).zip(fractions.chunks_mut(BACK_FACES_AT_ONCE));
+    for (number, (chunk, fractions)) in chunks.enumerate() {
+        report((number * BACK_FACES_AT_ONCE) as f64 / points.len() as f64);
+        back_faces(context, chunk, fractions, &mut Threads::new(workers, scratch).until(end))?;
+    }
+    Ok(())
 }
 
 /// Estimates the irradiance of `points` with the structures of `built`.
@@ -257,13 +281,6 @@ pub(crate) fn with_points(
     let deadline = workers.deadline.after(1.0);
     let mut scratch = memory.take_each("working memory", IrradianceRenderer::scratch(), workers.count())?;
     let context = SceneContext::new(scene, &built.bvh, &built.lights, settings.level);
-    let mut shares = vec![0.0; if settings.back_faces { points.len() } else { 0 }];
-    // The rest of the time is for the samples.
-    let end = End::Round(workers.deadline.after(0.5));
-    for (points, shares) in points.chunks(BACK_FACES_AT_ONCE).zip(shares.chunks_mut(BACK_FACES_AT_ONCE)) {
-        back_faces(&context, points, shares, &mut Threads::new(&workers, &mut scratch).until(end))?;
-        progress(&BakeProgress::after(start, settings, 0, [0; 2]));
-    }
     let mut executor = Threads::new(&workers, &mut scratch).until(End::FirstRound(None));
     let lights = built.lights.with_level(settings.level);
     let structures = (scene, built.bvh, lights);
@@ -271,25 +288,30 @@ pub(crate) fn with_points(
     let mut renderer = IrradianceRenderer::over(structures, points, &core, &mut arena, &mut executor)?;
     let before = earlier.as_ref().map_or(0.0, |file| file.header.seconds);
     earlier.map_or(Ok(()), |file| file.resume(&mut renderer))?;
-    let mut kept =
-        Kept::new(settings, (&identity, points.len(), core.goal, &shares), (start, before), interrupt);
+    let mut kept = Kept::new(settings, (&identity, points.len(), core.goal), (start, before), interrupt);
 
     let mut target = FIRST_SAMPLES.max(renderer.samples());
     let mut is_first = true;
     loop {
         let most = settings.stop.most_samples();
         target = most.map_or(target, |most| target.min(most));
-        // Every point has samples, some seconds after the end as well.
-        let end = if is_first { End::FirstRound(None) } else { End::Round(deadline) };
+        // Every point has samples, two seconds after the end as well.
+        let end = if is_first { End::Prepass } else { End::Round(deadline) };
         let mut executor = Threads::new(&workers, &mut scratch).until(end);
         let round = Instant::now();
         match settings.stop.error {
             Some(error) => renderer.step_within(&mut executor, error, target)?,
             None => renderer.step(&mut executor, Until::Samples(target))?,
         }
-        is_first = false;
+        let seconds = round.elapsed().as_secs_f64();
         let tiles = renderer.tiles();
-        progress(&BakeProgress::after(start, settings, renderer.samples(), tiles));
+        let report = BakeProgress::after(start, settings, renderer.samples(), tiles);
+        progress(&report);
+        if core::mem::take(&mut is_first) {
+            let report = &mut |part| progress(&BakeProgress { counting: Some(part), ..report });
+            let counted = (points, &mut kept.back_faces[..]);
+            count_back_faces(&context, counted, (&workers, &mut scratch), report)?;
+        }
         kept.update(&renderer);
         let is_exact = settings.stop.error.is_some() && tiles[0] == tiles[1];
         // Tiles within the error have fewer.
@@ -298,13 +320,13 @@ pub(crate) fn with_points(
         if is_exact || is_full || is_over || workers.deadline.is_interrupted() {
             break;
         }
-        target = grown(target, round.elapsed().as_secs_f64());
+        target = grown(target, seconds);
     }
-    let unsaved = kept.finish(&renderer);
+    let (unsaved, back_faces) = kept.finish(&renderer);
     Ok(Baked {
         unsaved,
         values: renderer.values().collect(),
-        back_faces: shares,
+        back_faces,
         tiles: renderer.tiles(),
         findings: renderer.findings(),
         counters: renderer.counters(),

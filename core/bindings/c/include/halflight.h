@@ -114,7 +114,7 @@ typedef enum {
     HALFLIGHT_STATUS_LIGHT = 6,
     // A picture has no pixel or more than 2^28, or there is no point or more than 2^30.
     HALFLIGHT_STATUS_SIZE = 7,
-    // A setting has a value that it cannot have.
+    // A setting or a field of view has a value that it cannot have, or a count exceeds what there is.
     HALFLIGHT_STATUS_SETTING = 8,
 } HalflightStatus;
 
@@ -335,7 +335,7 @@ typedef struct {
     float target[3];
     // Direction that is up in the picture.
     float up[3];
-    // Vertical field of view, above 0 and at most 178.
+    // Vertical field of view, above 0 and at most 178; 0 without a picture.
     float vertical_fov_degrees;
     // Radius of the lens; 0: a pinhole.
     float lens_radius;
@@ -391,7 +391,7 @@ HalflightStatus halflight_eigen3(const float *matrices,
                                  float *values,
                                  float *vectors);
 
-// Bytes for `count` points of `scene` and the `threads` of an executor.
+// Bytes for `count` points of `scene` and the `threads` of an executor; 0 of null and of no point.
 //
 // Requires:
 // `scene` is null or a scene.
@@ -421,7 +421,8 @@ HalflightStatus halflight_irradiance_step(HalflightIrradianceRenderer *renderer,
                                           uint32_t samples,
                                           double error);
 
-// Writes the irradiance of the first `count` points, in the order of the points.
+// Writes the irradiance of the first `count` points, in the order of the points. A count above theirs is a
+// mistake, and nothing is written.
 //
 // Requires:
 // `renderer` is one that no one writes; `values` has `count` elements.
@@ -443,7 +444,8 @@ HalflightStatus halflight_probes(const HalflightIrradiance *values,
                                  size_t count,
                                  HalflightProbe *probes);
 
-// Bytes of a picture of `scene` and the `threads` of an executor; 0 of null or settings that do not exist.
+// Bytes of a picture of `scene` and the `threads` of an executor; 0 of null, of a size that no picture has,
+// and of settings that do not exist.
 //
 // Requires:
 // Pointers are null or of a scene and settings.
@@ -493,7 +495,8 @@ uint32_t halflight_renderer_method(const HalflightRenderer *renderer);
 bool halflight_renderer_error(const HalflightRenderer *renderer,
                               HalflightError *error);
 
-// Writes `count` pixels of the picture, three floats of radiance each, row by row from the top.
+// Writes the first `count` pixels of the picture, three floats of radiance each, row by row from the top.
+// A count above that of the picture is a mistake, and nothing is written.
 //
 // Requires:
 // `renderer` is one that no one writes; `pixels` has `3 * count` floats.

@@ -38,9 +38,10 @@ pub struct HalflightIrradiance {
 pub struct HalflightIrradianceRenderer {
     renderer: IrradianceRenderer<'static>,
     scratch: Scratch,
+    count: usize,
 }
 
-/// Bytes for `count` points of `scene` and the `threads` of an executor.
+/// Bytes for `count` points of `scene` and the `threads` of an executor; 0 of null and of no point.
 ///
 /// # Safety
 /// `scene` is null or a scene.
@@ -52,6 +53,9 @@ pub unsafe extern "C" fn halflight_irradiance_memory(
 ) -> usize {
     // SAFETY: by the caller.
     let Ok(scene) = (unsafe { shared(scene) }) else { return 0 };
+    if count == 0 {
+        return 0;
+    }
     let memory = IrradianceRenderer::required_memory(&scene.scene, count);
     let points = Footprint::default().slice::<IrradiancePoint>(count);
     bytes_of::<HalflightIrradianceRenderer>(points.and(Scratch::footprint(memory, threads)))
@@ -87,7 +91,7 @@ pub unsafe extern "C" fn halflight_irradiance_new(
         let each = IrradianceRenderer::required_memory(scene, count).scratch;
         let mut scratch = Scratch::new(given.threads, each, arena)?;
         let renderer = IrradianceRenderer::new(scene, free, &settings, arena, &mut scratch.executor(given))?;
-        Ok(HalflightIrradianceRenderer { renderer, scratch })
+        Ok(HalflightIrradianceRenderer { renderer, scratch, count })
     };
     // SAFETY: by the caller.
     of(unsafe { place((memory, bytes), renderer, make) })
@@ -107,7 +111,7 @@ pub unsafe extern "C" fn halflight_irradiance_step(
 ) -> HalflightStatus {
     // SAFETY: by the caller.
     let (renderer, given) = unsafe { (unique(renderer), HalflightExecutor::at(executor)) };
-    of(renderer.and_then(|HalflightIrradianceRenderer { renderer, scratch }| {
+    of(renderer.and_then(|HalflightIrradianceRenderer { renderer, scratch, .. }| {
         let mut executor = scratch.executor(given);
         Ok(match (error > 0.0, samples) {
             (true, 0) => renderer.step(&mut executor, Until::Error(error)),
@@ -117,7 +121,8 @@ pub unsafe extern "C" fn halflight_irradiance_step(
     }))
 }
 
-/// Writes the irradiance of the first `count` points, in the order of the points.
+/// Writes the irradiance of the first `count` points, in the order of the points. A count above theirs is a
+/// mistake, and nothing is written.
 ///
 /// # Safety
 /// `renderer` is one that no one writes; `values` has `count` elements.
@@ -129,12 +134,16 @@ pub unsafe extern "C" fn halflight_irradiance_values(
 ) -> HalflightStatus {
     // SAFETY: by the caller.
     let arrays = unsafe { (|| Ok((shared(renderer)?, array_mut(values, count)?)))() };
-    of(arrays.map(|(renderer, values)| {
+    of(arrays.and_then(|(renderer, values)| {
+        if values.len() > renderer.count {
+            return Err(HalflightStatus::Setting);
+        }
         for (to, value) in values.iter_mut().zip(renderer.renderer.values()) {
             let irradiance = value.irradiance.to_array();
             let (lower, upper, samples) = (value.lower, value.upper, value.samples);
             *to = HalflightIrradiance { irradiance, lower, upper, samples };
         }
+        Ok(())
     }))
 }
 

@@ -27,7 +27,8 @@ pub struct HalflightRenderer {
     scratch: Scratch,
 }
 
-/// Bytes of a picture of `scene` and the `threads` of an executor; 0 of null or settings that do not exist.
+/// Bytes of a picture of `scene` and the `threads` of an executor; 0 of null, of a size that no picture has,
+/// and of settings that do not exist.
 ///
 /// # Safety
 /// Pointers are null or of a scene and settings.
@@ -67,8 +68,13 @@ pub unsafe extern "C" fn halflight_renderer_new(
         let renderer = Renderer::new(scene, &settings, arena, &mut scratch.executor(given))?;
         Ok(HalflightRenderer { renderer, scratch })
     };
-    // SAFETY: by the caller.
-    of(unsafe { place((memory, bytes), renderer, make) })
+    // SAFETY: by the caller. Settings that do not exist have no memory: they are the first mistake.
+    of(unsafe {
+        (|| {
+            shared(settings)?.of_core()?;
+            place((memory, bytes), renderer, make)
+        })()
+    })
 }
 
 /// Adds samples until each pixel has `samples`, or, where `error` is above 0, until the upper end of the
@@ -132,7 +138,8 @@ pub unsafe extern "C" fn halflight_renderer_error(
     true
 }
 
-/// Writes `count` pixels of the picture, three floats of radiance each, row by row from the top.
+/// Writes the first `count` pixels of the picture, three floats of radiance each, row by row from the top.
+/// A count above that of the picture is a mistake, and nothing is written.
 ///
 /// # Safety
 /// `renderer` is one that no one writes; `pixels` has `3 * count` floats.
@@ -144,10 +151,15 @@ pub unsafe extern "C" fn halflight_renderer_picture(
 ) -> HalflightStatus {
     // SAFETY: by the caller; arrays of floats have the alignment of their elements.
     let arrays = unsafe { (|| Ok((shared(renderer)?, array_mut(pixels.cast::<[f32; 3]>(), count)?)))() };
-    of(arrays.map(|(renderer, pixels)| {
+    of(arrays.and_then(|(renderer, pixels)| {
+        let film = renderer.renderer.film();
+        if pixels.len() as u64 > u64::from(film.width()) * u64::from(film.height()) {
+            return Err(HalflightStatus::Setting);
+        }
         for (to, light) in pixels.iter_mut().zip(renderer.renderer.picture()) {
             *to = light.to_array();
         }
+        Ok(())
     }))
 }
 

@@ -103,7 +103,7 @@ pub struct HalflightCamera {
     pub target: [f32; 3],
     /// Direction that is up in the picture.
     pub up: [f32; 3],
-    /// Vertical field of view, above 0 and at most 178.
+    /// Vertical field of view, above 0 and at most 178; 0 without a picture.
     pub vertical_fov_degrees: f32,
     /// Radius of the lens; 0: a pinhole.
     pub lens_radius: f32,
@@ -201,7 +201,7 @@ impl HalflightSceneDescription {
         let map = texture_id(self.environment_texture);
         let environment =
             (radiance.max_element() > 0.0).then_some(Environment { map, ..Environment::uniform(radiance) });
-        let camera = self.camera.of_core();
+        let camera = self.camera.of_core()?;
         Ok(Scene { mesh, materials, textures, lights, environment, camera })
     }
 }
@@ -275,11 +275,17 @@ impl HalflightLight {
     }
 }
 
+/// Field of view of a camera, at most.
+const MOST_DEGREES: f32 = 178.0;
+
 impl HalflightCamera {
-    fn of_core(&self) -> Camera {
+    fn of_core(&self) -> Result<Camera, HalflightStatus> {
+        if !(0.0..=MOST_DEGREES).contains(&self.vertical_fov_degrees) {
+            return Err(HalflightStatus::Setting);
+        }
         let [eye, target, up] = [self.eye, self.target, self.up].map(Vec3::from);
         let camera = Camera::look_at(eye, target, up, self.vertical_fov_degrees);
-        Camera { lens_radius: self.lens_radius, focus_distance: self.focus_distance, ..camera }
+        Ok(Camera { lens_radius: self.lens_radius, focus_distance: self.focus_distance, ..camera })
     }
 }
 

@@ -94,6 +94,7 @@ assert.deepEqual([...values], [5, 3, 2]);
 assert.throws(() => scene.renderer({ ...size, method: 'magic' }), /no method `magic`; there are auto, path/);
 assert.throws(() => scene.renderer({ width: 0, height: 5 }), /a picture has 1 to 2\^28 pixels/);
 assert.throws(() => halflight.scene({ ...room, triangles: Uint32Array.from([0, 1, 99, 0, 2, 3, 4, 5, 6]) }), /vertex or a material/);
+assert.throws(() => halflight.scene({ ...room, camera: { fov: 400 } }), /at most 178 degrees, and not 400/);
 assert.throws(() => halflight.scene({ ...room, materials: [{ surface: 'slime' }] }), /`slime`; it can be diffuse/);
 assert.throws(() => halflight.scene({ triangles: room.triangles }), /positions is no array/);
 assert.throws(() => joined.free() ?? joined.picture(), /memory of this object is free/);

@@ -2,6 +2,11 @@
 //!
 //!     halflight bake ../room.toml --lightmap all --size 256x192 --unit white -o assets/map.exr
 //!     halflight bake ../room.toml --probes 6x6x6 --box=-1,0,-1,1,2,1 -o assets/probes.ktx2
+//!
+//! An argument is the name of a PFM file, which gets a picture of 300 x 300 pixels without a window; `room`
+//! after it leaves the sphere out.
+
+mod picture;
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::Exposure;
@@ -12,15 +17,27 @@ use bevy::pbr::Lightmap;
 use bevy::prelude::*;
 use std::collections::BTreeMap;
 
-/// Texels are radiances: the exposure of the camera and this factor are 1 together.
+/// Texels are radiances: the exposure of the camera and this factor are 1 together. Emission has no exposure.
 const RADIANCE: f32 = 1.2;
 const EV100: f32 = 0.0;
 
 /// Box of the probes: its lowest corner and its sides.
 const BOX: [Vec3; 2] = [Vec3::new(-1.0, 0.0, -1.0), Vec3::splat(2.0)];
 
+/// Maps that a picture waits for.
+#[derive(Resource)]
+struct Maps([Handle<Image>; 2]);
+
 fn main() {
-    App::new().add_plugins(DefaultPlugins).add_systems(Startup, build).run();
+    let mut app = App::new();
+    match std::env::args().nth(1) {
+        Some(file) => picture::add_plugins(&mut app, file.into()),
+        None => {
+            app.add_plugins(DefaultPlugins);
+        }
+    }
+    // The default ambient light would be added to that of the maps.
+    app.insert_resource(GlobalAmbientLight::NONE).add_systems(Startup, build).run();
 }
 
 fn build(
@@ -29,12 +46,13 @@ fn build(
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
-    let map: Handle<Image> = assets.load("map.exr");
+    let [map, voxels]: [Handle<Image>; 2] = [assets.load("map.exr"), assets.load("probes.ktx2")];
+    commands.insert_resource(Maps([map.clone(), voxels.clone()]));
     for (name, mesh) in rooms(include_str!("../../room.obj")) {
         let (base, emissive) = match name.as_str() {
             "red" => (Color::linear_rgb(0.6, 0.06, 0.05), LinearRgba::BLACK),
             "green" => (Color::linear_rgb(0.12, 0.45, 0.1), LinearRgba::BLACK),
-            "lamp" => (Color::BLACK, LinearRgba::rgb(6.0, 5.4, 4.5) * RADIANCE),
+            "lamp" => (Color::BLACK, LinearRgba::rgb(6.0, 5.4, 4.5)),
             _ => (Color::linear_rgb(0.7, 0.7, 0.7), LinearRgba::BLACK),
         };
         commands.spawn((
@@ -43,18 +61,19 @@ fn build(
             Lightmap { image: map.clone(), bicubic_sampling: false, ..default() },
         ));
     }
-    let voxels = assets.load("probes.ktx2");
     let [low, sides] = BOX;
     commands.spawn((
         LightProbe::default(),
-        IrradianceVolume { voxels, intensity: RADIANCE, ..default() },
+        IrradianceVolume { voxels, intensity: RADIANCE, affects_lightmapped_meshes: false },
         Transform::from_translation(low + 0.5 * sides).with_scale(sides),
     ));
-    commands.spawn((
-        Mesh3d(meshes.add(Sphere::new(0.3).mesh().uv(64, 32))),
-        MeshMaterial3d(materials.add(diffuse(Color::linear_rgb(0.7, 0.7, 0.7), LinearRgba::BLACK))),
-        Transform::from_xyz(0.5, 0.45, 0.25),
-    ));
+    if std::env::args().nth(2).as_deref() != Some("room") {
+        commands.spawn((
+            Mesh3d(meshes.add(Sphere::new(0.3).mesh().uv(64, 32))),
+            MeshMaterial3d(materials.add(diffuse(Color::linear_rgb(0.7, 0.7, 0.7), LinearRgba::BLACK))),
+            Transform::from_xyz(0.5, 0.45, 0.25),
+        ));
+    }
     commands.spawn((
         Camera3d::default(),
         Exposure { ev100: EV100 },

@@ -6,7 +6,7 @@ use crate::irradiance::{PointKeywords, state};
 use crate::scene::Renderer;
 use crate::watch::watched;
 use core::sync::atomic::Ordering;
-use halflight::bake::{self, BakeProgress, LightMap, LightmapSettings, Quantity, Texel};
+use halflight::bake::{self, BakeProgress, DirectionalLayout, LightMap, LightmapSettings, Quantity, Texel};
 use halflight::save::{Format, Patience, write_bytes};
 use numpy::{PyArray2, PyArray4};
 use pyo3::exceptions::PyBaseException;
@@ -41,7 +41,8 @@ pub(crate) fn lightmap<'py>(
     let inner = renderer.inner()?;
     let loaded = inner.scene();
     let (size, subject, points, padding, directional) = parts;
-    let settings = LightmapSettings { subject, size, points, padding, directional };
+    let layout = DirectionalLayout::Linear;
+    let settings = LightmapSettings { subject, size, points, padding, directional, layout };
     let views = loaded.views();
     let mut budget = bake::budget(&views.scene(loaded.camera_or_default()), renderer.memory);
     let before = budget.left();

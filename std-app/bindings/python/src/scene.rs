@@ -100,10 +100,13 @@ type Hits<'py> = (
 
 #[pymethods]
 impl Renderer {
-    /// Notes of the loader.
+    /// Notes of the loader, and that nothing emits light.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.scene().repairs.clone()
+        let loaded = self.scene();
+        let is_dark = loaded.views().scene(loaded.camera_or_default()).is_dark();
+        let dark = is_dark.then(|| "nothing in this scene emits light: its pictures are black".to_owned());
+        loaded.repairs.iter().cloned().chain(dark).collect()
     }
 
     /// Vertex positions in the coordinates of the files.

@@ -22,6 +22,14 @@ def test_arrays_make_the_scene_of_a_file(tmp_path):
     assert of_arrays.image.max() > 0
 
 
+def test_a_scene_without_light_has_a_note():
+    def is_noted(scene):
+        return any("nothing in this scene emits light" in note for note in scene.notes)
+
+    assert is_noted(hl.Scene([hl.Mesh(SQUARE, TRIANGLES)]))
+    assert not is_noted(sky_floor())
+
+
 def test_every_material_and_light_renders():
     materials = [
         hl.diffuse((0.5, 0.4, 0.3)),

@@ -7,9 +7,9 @@ use crate::cli::interrupt::INTERRUPT;
 use crate::cli::outputs::Outputs;
 use crate::cli::progress::ProgressReporter;
 use crate::cli::{print_note, values};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use core::sync::atomic::Ordering;
-use halflight::bake::{Lightmap, LightmapError, LightmapSettings};
+use halflight::bake::{DirectionalLayout, Lightmap, LightmapError, LightmapSettings};
 use halflight::load::LoadOptions;
 use halflight::report::file_name;
 use serde_json::{Value, json};
@@ -44,8 +44,18 @@ pub(super) struct LightmapArgs {
           conflicts_with_all = OTHERS)]
     supersample: Option<u32>,
     /// Irradiance as a linear function a + b·n of the normal: four layers, one below the other
-    #[arg(long, conflicts_with_all = OTHERS)]
-    directional: bool,
+    #[arg(long, value_name = "LAYOUT", num_args = 0..=1, require_equals = true,
+          default_missing_value = "linear", conflicts_with_all = OTHERS)]
+    directional: Option<Layout>,
+}
+
+/// Layers of a directional lightmap.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Layout {
+    /// a, and b along x, y and z
+    Linear,
+    /// Those of Godot
+    Godot,
 }
 
 impl LightmapArgs {
@@ -56,19 +66,23 @@ impl LightmapArgs {
 
     fn run_lightmap(&self, bake: &Bake, (subject, size): (&str, [u32; 2])) -> Result<ExitCode, Failure> {
         let mut outputs = Outputs::new(bake.json);
-        let files = MapFiles::new(&bake.output, self.error_map.as_deref(), self.directional)?;
-        files.plan(&mut outputs)?;
-        bake.parts.plan(&mut outputs)?;
-        check_outputs(bake, "--lightmap", "-o map.exr")?;
-        let options = LoadOptions { memory: bake.memory, keeps_texcoords: true, ..LoadOptions::default() };
-        let loaded = bake.load(&outputs, &options)?;
         let settings = LightmapSettings {
             subject: (subject != "all").then(|| subject.to_owned()),
             size,
             points: self.supersample.unwrap_or(1),
             padding: self.pad.unwrap_or(PADDING),
-            directional: self.directional,
+            directional: self.directional.is_some(),
+            layout: match self.directional {
+                Some(Layout::Godot) => DirectionalLayout::Godot,
+                Some(Layout::Linear) | None => DirectionalLayout::Linear,
+            },
         };
+        let files = MapFiles::new(&bake.output, self.error_map.as_deref(), settings.is_signed())?;
+        files.plan(&mut outputs)?;
+        bake.parts.plan(&mut outputs)?;
+        check_outputs(bake, "--lightmap", "-o map.exr")?;
+        let options = LoadOptions { memory: bake.memory, keeps_texcoords: true, ..LoadOptions::default() };
+        let loaded = bake.load(&outputs, &options)?;
         let mut memory = memory(bake, &loaded);
         let before = memory.left();
         let start = Instant::now();

@@ -48,11 +48,7 @@ impl ProbeArgs {
         let baked = bake.bake(&loaded, grid.points(), (limit, grid.attachment()), 0.0)?;
         baked.unsaved.iter().for_each(|why| outputs.fail(why.clone()));
         let saved = files.save(&mut outputs, (&grid, &baked));
-        // Probes of other parts have no light yet, as if they were inside bodies.
-        let text = match bake.parts.is_part() {
-            true => bake.text(&baked),
-            false => format!("{saved}{}", bake.text(&baked)),
-        };
+        let text = format!("{saved}{}", bake.text(&baked));
         let object = || {
             let mut object = bake.object(&baked);
             saved.add_to(&mut object);

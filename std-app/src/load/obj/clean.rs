@@ -224,6 +224,9 @@ impl Cleaner<'_> {
         corners.clear();
         for word in operands {
             corners.push(indices.corner(line, word)?);
+            if word.last() == Some(&b'/') {
+                notes.at(line, "corner of a face without an index after its last slash");
+            }
         }
         if corners.len() < 3 {
             notes.at(line, "face with fewer than three corners left out");

@@ -20,7 +20,7 @@ pub use sky::SkyEntry;
 pub(super) use values::BRIGHTEST;
 pub use values::{Colour, Factors, Matrix, Reflectance, Rotation};
 
-use super::error::LoadError;
+use super::error::{LoadError, TextPlace};
 use super::files::{Found, Lookup};
 use super::map::Map;
 use super::notes::Notes;
@@ -124,10 +124,13 @@ impl<'a> Source<'a> {
     }
 
     fn error(&self, span: Range<usize>, problem: impl Into<String>, help: impl Into<String>) -> LoadError {
-        let line = self.line(&span);
+        self.place(&span).error(problem, help)
+    }
+
+    fn place(&self, span: &Range<usize>) -> TextPlace {
+        let line = self.line(span);
         let before = self.text.get(self.lines[line - 1]..span.start).unwrap_or_default();
-        let column = before.chars().count() as u32 + 1;
-        LoadError { column, ..LoadError::at(self.file, line as u32, problem, help) }
+        TextPlace { file: self.file.into(), line: line as u32, column: before.chars().count() as u32 + 1 }
     }
 
     /// Line of an entry, from 1.
@@ -156,7 +159,8 @@ impl<'a> Source<'a> {
 
     /// The texture at a path of the scene file.
     fn map(&self, path: &Spanned<String>) -> Result<Map, LoadError> {
-        Ok(Map::of_file(path.get_ref(), self.resolve(path)?))
+        let named = Some(self.place(&path.span()));
+        Ok(Map { named, ..Map::of_file(path.get_ref(), self.resolve(path)?) })
     }
 }
 

@@ -161,6 +161,27 @@ fn threads_of_the_program_give_the_same_bits() {
 }
 
 #[test]
+fn mistakes_have_a_status() {
+    let file = folder().join("tests/mistakes.c");
+    let lines = lines_of(&mut Command::new(compiled_from(&file, "mistakes", &C, false)));
+    let expected = [
+        "width 0: 0 bytes",
+        "width 0: 7",
+        "12 pixels: 0",
+        "13 pixels: 8",
+        "no points: 0 bytes",
+        "1 value: 0",
+        "2 values: 8",
+        "0 degrees: 0",
+        "178 degrees: 0",
+        "179 degrees: 8",
+        "400 degrees: 8",
+        "-40 degrees: 8",
+    ];
+    assert_eq!(lines, expected);
+}
+
+#[test]
 fn no_program_touches_memory_that_is_not_its_own() {
     for name in EXAMPLES {
         let sanitized =

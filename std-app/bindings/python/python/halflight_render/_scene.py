@@ -122,7 +122,7 @@ class Scene:
 
     @property
     def notes(self) -> list[str]:
-        """What the loader repaired, a sentence for each kind."""
+        """What the loader repaired, a sentence for each kind, and that nothing emits light."""
         return self._renderer.notes
 
     @property
