@@ -52,23 +52,24 @@ impl Trial {
     /// light that the few paths of the trial miss.
     fn error_of_rare_light(&self, work: f64, pilot: Option<PilotNoise>) -> f64 {
         pilot.map_or(0.0, |noise| {
-            noise.rests[0].error(work / f64::from(noise.work_of_paths) / self.reuse, self.pixels)
+            let samples = work / f64::from(noise.work_of_paths) / self.reuse;
+            noise.rests[0].reduced(self.gains.paths).error(samples, self.pixels)
         })
     }
 
     /// relMSE of path tracing after so much work for each pixel.
     fn error_of_paths(&self, work: f64) -> f64 {
-        self.reuse * self.noise[0] * self.work[0] / work
+        self.reuse * self.noise[0] * self.work[0] / (self.gains.paths * work)
     }
 
     /// Row of a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
-    /// `noise` is that of samples of each.
-    fn cached(&self, supply: usize, work: f64, noise: &[f64; SUPPLIES]) -> Row {
+    /// `noise` is that of samples of each, `left` what a reconstruction leaves of it.
+    fn cached(&self, supply: usize, work: f64, noise: &[f64; SUPPLIES], left: f64) -> Row {
         let work_of_sample = CACHED_RAY * work_of_detail(self.triangles) * self.work[supply];
         let pixels = self.pixels / f64::from(self.caches.shards);
         let picture = CachedPicture {
             rays: work * pixels,
-            samples: noise[supply] * work_of_sample * pixels,
+            samples: left * work_of_sample * pixels,
             gathered: (noise[0] - noise[supply]).max(0.0),
         };
         let (kind, of_lobes) = match supply {
@@ -126,17 +127,21 @@ impl Trial {
             )
         };
         // Rare light is that of records or of the rest.
-        let noise = core::array::from_fn(|i| match (i, pilot) {
-            (0, _) => self.noise[0] * paths.error / of_trial,
-            (_, None) => factor * self.noise[i],
-            (_, Some(noise)) => {
+        let beside = |i: usize, gain: f64| match pilot {
+            None => factor * self.noise[i] / gain,
+            Some(noise) => {
                 let samples = work / self.work[i];
-                (factor * self.noise[i]).max(samples * noise.rests[i].error(samples, self.pixels))
+                let rare = noise.rests[i].reduced(gain).error(samples, self.pixels);
+                (factor * self.noise[i] / gain).max(samples * rare)
             }
+        };
+        let noise = core::array::from_fn(|i| match i {
+            0 => self.noise[0] * paths.error / of_trial,
+            _ => beside(i, 1.0),
         });
         let without_lobes = (!self.has_lobes).then_some("records serve no lobe of the scene");
         let cached = |supply, without: Option<_>| {
-            let row = self.cached(supply, work, &noise);
+            let row = self.cached(supply, work, &noise, beside(supply, self.gains.beside_records));
             without.map_or(row, |reason| Row::without(row.kind, reason))
         };
         let merges = light_paths.is_ok_and(|choice| choice.counts.merging);
@@ -146,6 +151,7 @@ impl Trial {
                 if choice.counts.light_paths > 0.0 =>
             {
                 let samples = work / f64::from(rays);
+                let noise = noise.reduced(self.gains.light_paths);
                 let error = noise.error(samples / LIGHT_PATHS_ERROR, self.pixels);
                 Row { error, work: rays.into(), ..Row::without(kind, choice.light_paths) }
             }
@@ -155,7 +161,7 @@ impl Trial {
         let photons = match photons {
             Err(reason) => Row::without(ProgressivePhotons, reason),
             Ok(pilot) => Row {
-                error: PROGRESSIVE_ERROR * pilot.error(work),
+                error: PROGRESSIVE_ERROR * pilot.reduced(self.gains.photons).error(work),
                 work: pilot.work,
                 ..Row::without(ProgressivePhotons, "noise and blur of its first samples")
             },
