@@ -67,12 +67,10 @@ pub(super) const PROGRESSIVE_ERROR: f64 = 2.0;
 /// and noise that sixteen samples of a block do not show. Geometric mean of 34 rows (choice-of-method.md).
 pub(super) const PHOTONS_ERROR: f64 = 4.0;
 
-/// Factors by which a reconstruction divides the noise of samples by paths, of those beside records, of light
-/// paths and of progressive photons (choice-of-method.md, reconstructed pictures).
-pub(super) const GAIN_OF_PATHS: f64 = 3.7;
-pub(super) const GAIN_BESIDE_RECORDS: f64 = 1.65;
-pub(super) const GAIN_OF_LIGHT_PATHS: f64 = 4.2;
-pub(super) const GAIN_OF_PHOTONS: f64 = 2.6;
+/// Factors by which a reconstruction divides the noise of samples, and that of samples beside records and
+/// caustic photons, of which there is time for fewer than counted (choice-of-method.md, reconstructed pictures).
+pub(super) const GAIN_OF_SAMPLES: f64 = 4.0;
+pub(super) const GAIN_BESIDE_PHOTONS: f64 = 2.0;
 
 /// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error. And gather
 /// rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in records

@@ -53,13 +53,13 @@ impl Trial {
     fn error_of_rare_light(&self, work: f64, pilot: Option<PilotNoise>) -> f64 {
         pilot.map_or(0.0, |noise| {
             let samples = work / f64::from(noise.work_of_paths) / self.reuse;
-            noise.rests[0].reduced(self.gains.paths).error(samples, self.pixels)
+            noise.rests[0].reduced(self.gains.samples).error(samples, self.pixels)
         })
     }
 
     /// relMSE of path tracing after so much work for each pixel.
     fn error_of_paths(&self, work: f64) -> f64 {
-        self.reuse * self.noise[0] * self.work[0] / (self.gains.paths * work)
+        self.reuse * self.noise[0] * self.work[0] / (self.gains.samples * work)
     }
 
     /// Row of a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
@@ -140,8 +140,9 @@ impl Trial {
             _ => beside(i, 1.0),
         });
         let without_lobes = (!self.has_lobes).then_some("records serve no lobe of the scene");
+        let gain = self.gains.beside_records(self.has_photons);
         let cached = |supply, without: Option<_>| {
-            let row = self.cached(supply, work, &noise, beside(supply, self.gains.beside_records));
+            let row = self.cached(supply, work, &noise, beside(supply, gain));
             without.map_or(row, |reason| Row::without(row.kind, reason))
         };
         let merges = light_paths.is_ok_and(|choice| choice.counts.merging);
@@ -151,7 +152,7 @@ impl Trial {
                 if choice.counts.light_paths > 0.0 =>
             {
                 let samples = work / f64::from(rays);
-                let noise = noise.reduced(self.gains.light_paths);
+                let noise = noise.reduced(self.gains.samples);
                 let error = noise.error(samples / LIGHT_PATHS_ERROR, self.pixels);
                 Row { error, work: rays.into(), ..Row::without(kind, choice.light_paths) }
             }
@@ -161,7 +162,7 @@ impl Trial {
         let photons = match photons {
             Err(reason) => Row::without(ProgressivePhotons, reason),
             Ok(pilot) => Row {
-                error: PROGRESSIVE_ERROR * pilot.reduced(self.gains.photons).error(work),
+                error: PROGRESSIVE_ERROR * pilot.reduced(self.gains.samples).error(work),
                 work: pilot.work,
                 ..Row::without(ProgressivePhotons, "noise and blur of its first samples")
             },
