@@ -68,7 +68,7 @@ pub(super) const PROGRESSIVE_ERROR: f64 = 2.0;
 pub(super) const PHOTONS_ERROR: f64 = 4.0;
 
 /// Factors by which a reconstruction divides the noise of samples, and that of samples beside records and
-/// caustic photons, of which there is time for fewer than counted (choice-of-method.md, reconstructed pictures).
+/// caustic photons, for half of which there is time (choice-of-method.md, reconstructed pictures).
 pub(super) const GAIN_OF_SAMPLES: f64 = 4.0;
 pub(super) const GAIN_BESIDE_PHOTONS: f64 = 2.0;
 

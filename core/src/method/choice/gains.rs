@@ -1,5 +1,5 @@
-//! Noise that a reconstruction of the picture takes away. It reduces the noise of samples, which the halves of
-//! the film do not share; the noise of records and the blur of density estimates stay.
+//! Noise that a reconstruction of the picture takes away. It reduces the noise of samples, which the halves
+//! of the film do not share; the noise of records and the blur of density estimates stay.
 
 use crate::method::tuned::{GAIN_BESIDE_PHOTONS, GAIN_OF_SAMPLES};
 

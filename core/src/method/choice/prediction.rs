@@ -22,6 +22,15 @@ fn pilot(light_paths: Result<counts::Choice, &'static str>) -> Option<PilotNoise
     light_paths.ok().filter(|choice| choice.gain.is_some()).map(|choice| choice.noise)
 }
 
+/// Path tracing, where it shows no noise.
+fn paths_alone() -> Table<ROWS> {
+    use MethodKind::{Bidirectional, IrradianceCache, Path, ProgressivePhotons, RadianceCache};
+    let kinds = [Path, IrradianceCache, RadianceCache, Bidirectional, ProgressivePhotons];
+    let mut rows = kinds.map(|kind| Row::without(kind, "paths show no noise"));
+    rows[0].error = 0.0;
+    Table(rows)
+}
+
 impl Trial {
     /// Work for each pixel that reaches `goal` by path tracing, in rays.
     fn budget(&self, goal: &Goal) -> f64 {
@@ -99,15 +108,9 @@ impl Trial {
         light_paths: Result<counts::Choice, &'static str>,
         photons: Result<MethodPilot, &'static str>,
     ) -> Table<ROWS> {
-        use MethodKind::{
-            Bidirectional, IrradianceCache, Path, ProgressivePhotons, RadianceCache, VertexMerging,
-        };
+        use MethodKind::{Bidirectional, Path, ProgressivePhotons, VertexMerging};
         if self.noise[0] <= 0.0 {
-            let reason = "paths show no noise";
-            let kinds = [Path, IrradianceCache, RadianceCache, Bidirectional, ProgressivePhotons];
-            let mut rows = kinds.map(|kind| Row::without(kind, reason));
-            rows[0].error = 0.0;
-            return Table(rows);
+            return paths_alone();
         }
         let work = self.budget(goal);
         let pilot = pilot(light_paths);
