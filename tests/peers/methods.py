@@ -7,7 +7,9 @@ the spread of two or more seeds. Biased methods may differ; others may not. Each
 has relMSE; the regret of `auto` is its error over that of the best other method. References are pairs of
 pictures of other seeds by a method that suits the scene, kept in the output folder: in the product of the
 differences from both their noise cancels. Runs are kept, too: a second call renders those that are missing. Needs numpy, and
-the published scenes in HALFLIGHT_SCENES.
+the published scenes in HALFLIGHT_SCENES. `--reconstruct auto` measures the pictures that the program shows by default,
+and `--processor-time` gives the program the clock of its own processor time, by a library that `cc` builds, so that other
+work on the machine changes little.
 """
 
 import argparse
@@ -31,6 +33,15 @@ OUTPUT = ROOT / "tests" / "output" / "methods"
 PROGRAM = os.environ.get("HALFLIGHT", str(ROOT / "target" / "release" / "halflight"))
 SIZE = (128, 128)
 METHODS = ["path", "irradiance-cache", "radiance-cache", "sppm", "bdpt", "vcm", "mlt", "instant-radiosity", "photon-map", "auto"]
+CLOCK = """
+#define _GNU_SOURCE
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+int clock_gettime(clockid_t id, struct timespec *time) {
+    return syscall(SYS_clock_gettime, id == CLOCK_MONOTONIC ? CLOCK_PROCESS_CPUTIME_ID : id, time);
+}
+"""
 HARD = Path(__file__).resolve().parent / "scenes" / "hard"
 
 # Scenes, and the method of their references.
@@ -64,11 +75,19 @@ def reference_method(name):
     return {"door": "bdpt", "spot": "bdpt", "glass ball": "sppm", "sun": "bdpt"}.get(random_rooms.light(int(name[5:])), "path")
 
 
-def render(scene, flags, threads=1):
+def use_processor_time():
+    """Gives the programs of this process the clock of their processor time."""
+    source, library = OUTPUT / "clock.c", OUTPUT / "clock.so"
+    source.write_text(CLOCK)
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", str(library), str(source)], check=True)
+    os.environ["LD_PRELOAD"] = str(library)
+
+
+def render(scene, flags, threads=1, reconstruct="off"):
     """The picture and the facts of `--json` of one render."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.pfm"
-        command = [PROGRAM, "render", "--reconstruct", "off", str(scene), "--size", "{}x{}".format(*SIZE), "--json", "-o", str(picture)]
+        command = [PROGRAM, "render", "--reconstruct", reconstruct, str(scene), "--size", "{}x{}".format(*SIZE), "--json", "-o", str(picture)]
         done = subprocess.run(command + ["--threads", str(threads)] + flags, capture_output=True, text=True)
         if done.returncode not in (0, 3):
             raise RuntimeError(f"{command} {flags}: {done.stderr}")
@@ -77,7 +96,7 @@ def render(scene, flags, threads=1):
 
 def reference(name, scene, seconds):
     """Two converged pictures of seeds of their own."""
-    kept = OUTPUT / f"{name}.npz"
+    kept = OUTPUT / (f"{name}.npz" if SIZE == (128, 128) else f"{name}-{SIZE[0]}.npz")
     if not kept.exists():
         flags = ["--time", f"{seconds}s", "--method", reference_method(name)]
         pair = [render(scene, [*flags, "--seed", seed])[0] for seed in ("1000", "1001")]
@@ -94,9 +113,9 @@ def left(pair):
 
 def one(job):
     """Row of the log: a method on a scene for a budget."""
-    name, scene, method, budget, seed, pair = job
+    name, scene, method, budget, seed, pair, reconstruct = job
     flags = ["--time", f"{budget}s", "--seed", str(seed), "--method", method]
-    picture, facts = render(scene, flags)
+    picture, facts = render(scene, flags, reconstruct=reconstruct)
     error = max(relmse_of_pair(picture, pair), 1e-9)
     return {"scene": name, "method": method, "chosen": facts["method"], "budget": budget, "seed": seed, "spp": facts["spp"],
             "relmse": error, "mean": float(picture.mean() / pair.mean()), "seconds": facts["seconds"]["render"]}
@@ -112,8 +131,15 @@ def main():
     parser.add_argument("--reference-seconds", type=int, default=60)
     parser.add_argument("--log", default=str(OUTPUT / "runs.jsonl"))
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--side", type=int, default=128, help="of pictures and references; other sides need a log of their own")
+    parser.add_argument("--reconstruct", choices=["auto", "off"], default="off", help="auto needs a log of its own")
+    parser.add_argument("--processor-time", action="store_true")
     a = parser.parse_args()
     OUTPUT.mkdir(parents=True, exist_ok=True)
+    global SIZE
+    SIZE = (a.side, a.side)
+    if a.processor_time:
+        use_processor_time()
     log = Path(a.log)
     rows = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     known = {(row["scene"], row["method"], row["budget"], row["seed"]) for row in rows}
@@ -122,7 +148,7 @@ def main():
         files = {name: scene_file(name, folder) for name in names}
         converged = dict(zip(names, pool.map(lambda name: reference(name, files[name], a.reference_seconds), names)))
         jobs = [
-            (name, files[name], method, budget, seed, converged[name])
+            (name, files[name], method, budget, seed, converged[name], a.reconstruct)
             for name in names for budget in a.budgets for seed in range(1, a.seeds + 1)
             for method in a.methods.split(",") if (name, method, budget, seed) not in known
         ]

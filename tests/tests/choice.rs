@@ -6,7 +6,9 @@
 use crate::table::scenes::SCENES;
 use core::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
-use halflight::render::{self, Checkpoint, Ending, Method, Progress, RenderResult, Settings, Stop};
+use halflight::render::{
+    self, Checkpoint, Ending, Method, Progress, Reconstruct, RenderResult, Settings, Stop,
+};
 use halflight_core::Rgb;
 use halflight_core::findings::Value;
 use halflight_core::scene::{Camera, Material, Scene};
@@ -198,14 +200,15 @@ fn choice_alone(scene: &Scene, change: impl FnOnce(&mut Settings)) -> RenderResu
 const BUDGETS: [u32; 3] = [16, 64, 1024];
 
 /// Chosen method and predicted errors of each scene of the table.
-fn choices() -> String {
-    let mut text = format!("# {SIZE} x {SIZE} pixels, seed 0; predicted relMSE, rounded\n");
+fn choices(reconstruct: Reconstruct) -> String {
+    let mut text = String::new();
     for scene in SCENES {
         for spp in BUDGETS {
             let max_depth = scene.max_depth;
             scene.with(|scene| {
                 let result = choice_alone(scene, |settings| {
                     (settings.max_depth, settings.stop.spp) = (max_depth, Some(spp));
+                    settings.reconstruct = reconstruct;
                 });
                 text += &format!("{:>5} spp {:<16}", spp, result.method.name());
                 for method in ["path", "irradiance-cache", "radiance-cache", "bdpt", "sppm"] {
@@ -221,5 +224,7 @@ fn choices() -> String {
 
 #[test]
 fn choices_are_those_of_the_snapshot() {
-    snapshot::check("choices.txt", &choices());
+    let [raw, reconstructed] = [Reconstruct::Off, Reconstruct::Auto].map(choices);
+    let head = format!("# {SIZE} x {SIZE} pixels, seed 0; predicted relMSE, rounded\n");
+    snapshot::check("choices.txt", &format!("{head}{raw}# reconstructed pictures\n{reconstructed}"));
 }

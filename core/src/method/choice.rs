@@ -4,12 +4,14 @@
 //! counted in rays and not in seconds: the choice follows from scene, settings, seed, memory and, where time
 //! is limited, the number of threads.
 
+mod gains;
 mod goal;
 mod method_pilot;
 mod prediction;
 mod table;
 mod trial;
 
+pub use gains::NoiseGains;
 pub use goal::Goal;
 pub use method_pilot::MethodPilot;
 pub use prediction::ROWS;

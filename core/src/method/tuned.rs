@@ -67,6 +67,11 @@ pub(super) const PROGRESSIVE_ERROR: f64 = 2.0;
 /// and noise that sixteen samples of a block do not show. Geometric mean of 34 rows (choice-of-method.md).
 pub(super) const PHOTONS_ERROR: f64 = 4.0;
 
+/// Factors by which a reconstruction divides the noise of samples, and that of samples beside records and
+/// caustic photons, for half of which there is time (choice-of-method.md, reconstructed pictures).
+pub(super) const GAIN_OF_SAMPLES: f64 = 4.0;
+pub(super) const GAIN_BESIDE_PHOTONS: f64 = 2.0;
+
 /// relMSE of interpolation without noise by the coarsest cache; it falls with the allowed error. And gather
 /// rays whose mean a pixel sees, for each of a record: look-ups interpolate, and gather rays end in records
 /// (cache-time.md).

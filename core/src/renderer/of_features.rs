@@ -116,6 +116,7 @@ impl<'a, F: Features> FeatureRenderer<'a, F> {
                 audit_fraction(settings.audit, is_biased).map_or(0, |_| reserve)
             }),
             is_audited: audit_fraction(settings.audit, true).is_some(),
+            is_reconstructed: reconstruction.is_some(),
             kept: KeptCaches::default(),
             widens: true,
             has_fixed_records: false,

@@ -3,13 +3,21 @@
 use super::memory::Memory;
 use super::setup::RenderSetup;
 use super::threads::Threads;
-use super::{Method, RenderError};
+use super::{Method, RenderError, Settings};
 use halflight_core::bsdf::Features;
 use halflight_core::findings::Decision::LeftOut;
 use halflight_core::findings::Finding;
 use halflight_core::memory::MemorySource;
 use halflight_core::reconstruction::{FilmReconstruction, FirstSurfaces, LEAST_SAMPLES, TOPIC};
 use halflight_core::renderer::Reconstruct;
+
+impl Settings {
+    /// True if the picture is to be reconstructed and may have enough samples for that.
+    pub(super) fn is_reconstructed(&self) -> bool {
+        let has_few = self.stop.spp.is_some_and(|spp| spp < LEAST_SAMPLES);
+        self.reconstruct == Reconstruct::Auto && !has_few
+    }
+}
 
 /// Searches for the surfaces of the view, if the settings ask for a reconstruction of enough samples, and the
 /// finding where `method` or the memory allow none. Nothing also at the end of the time. The film file of a
@@ -20,8 +28,7 @@ pub(super) fn set_up<'m, 'a: 'm, F: Features>(
     memory: &mut Memory<'m>,
 ) -> Result<(Option<FilmReconstruction<'m>>, Option<Finding>), RenderError> {
     let RenderSetup { scene, settings, workers, .. } = *setup;
-    let has_few = settings.stop.spp.is_some_and(|spp| spp < LEAST_SAMPLES);
-    if settings.reconstruct == Reconstruct::Off || has_few {
+    if !settings.is_reconstructed() {
         return Ok((None, None));
     }
     let without = |reason| Ok((None, Some(Finding::new(TOPIC, LeftOut, reason))));

@@ -22,6 +22,15 @@ fn pilot(light_paths: Result<counts::Choice, &'static str>) -> Option<PilotNoise
     light_paths.ok().filter(|choice| choice.gain.is_some()).map(|choice| choice.noise)
 }
 
+/// Path tracing, where it shows no noise.
+fn paths_alone() -> Table<ROWS> {
+    use MethodKind::{Bidirectional, IrradianceCache, Path, ProgressivePhotons, RadianceCache};
+    let kinds = [Path, IrradianceCache, RadianceCache, Bidirectional, ProgressivePhotons];
+    let mut rows = kinds.map(|kind| Row::without(kind, "paths show no noise"));
+    rows[0].error = 0.0;
+    Table(rows)
+}
+
 impl Trial {
     /// Work for each pixel that reaches `goal` by path tracing, in rays.
     fn budget(&self, goal: &Goal) -> f64 {
@@ -52,23 +61,24 @@ impl Trial {
     /// light that the few paths of the trial miss.
     fn error_of_rare_light(&self, work: f64, pilot: Option<PilotNoise>) -> f64 {
         pilot.map_or(0.0, |noise| {
-            noise.rests[0].error(work / f64::from(noise.work_of_paths) / self.reuse, self.pixels)
+            let samples = work / f64::from(noise.work_of_paths) / self.reuse;
+            noise.rests[0].reduced(self.gains.samples).error(samples, self.pixels)
         })
     }
 
     /// relMSE of path tracing after so much work for each pixel.
     fn error_of_paths(&self, work: f64) -> f64 {
-        self.reuse * self.noise[0] * self.work[0] / work
+        self.reuse * self.noise[0] * self.work[0] / (self.gains.samples * work)
     }
 
     /// Row of a cache after so much work for each pixel, by the light that records supply ([`SUPPLIES`]).
-    /// `noise` is that of samples of each.
-    fn cached(&self, supply: usize, work: f64, noise: &[f64; SUPPLIES]) -> Row {
+    /// `noise` is that of samples of each, `left` what a reconstruction leaves of it.
+    fn cached(&self, supply: usize, work: f64, noise: &[f64; SUPPLIES], left: f64) -> Row {
         let work_of_sample = CACHED_RAY * work_of_detail(self.triangles) * self.work[supply];
         let pixels = self.pixels / f64::from(self.caches.shards);
         let picture = CachedPicture {
             rays: work * pixels,
-            samples: noise[supply] * work_of_sample * pixels,
+            samples: left * work_of_sample * pixels,
             gathered: (noise[0] - noise[supply]).max(0.0),
         };
         let (kind, of_lobes) = match supply {
@@ -98,15 +108,9 @@ impl Trial {
         light_paths: Result<counts::Choice, &'static str>,
         photons: Result<MethodPilot, &'static str>,
     ) -> Table<ROWS> {
-        use MethodKind::{
-            Bidirectional, IrradianceCache, Path, ProgressivePhotons, RadianceCache, VertexMerging,
-        };
+        use MethodKind::{Bidirectional, Path, ProgressivePhotons, VertexMerging};
         if self.noise[0] <= 0.0 {
-            let reason = "paths show no noise";
-            let kinds = [Path, IrradianceCache, RadianceCache, Bidirectional, ProgressivePhotons];
-            let mut rows = kinds.map(|kind| Row::without(kind, reason));
-            rows[0].error = 0.0;
-            return Table(rows);
+            return paths_alone();
         }
         let work = self.budget(goal);
         let pilot = pilot(light_paths);
@@ -126,17 +130,22 @@ impl Trial {
             )
         };
         // Rare light is that of records or of the rest.
-        let noise = core::array::from_fn(|i| match (i, pilot) {
-            (0, _) => self.noise[0] * paths.error / of_trial,
-            (_, None) => factor * self.noise[i],
-            (_, Some(noise)) => {
+        let beside = |i: usize, gain: f64| match pilot {
+            None => factor * self.noise[i] / gain,
+            Some(noise) => {
                 let samples = work / self.work[i];
-                (factor * self.noise[i]).max(samples * noise.rests[i].error(samples, self.pixels))
+                let rare = noise.rests[i].reduced(gain).error(samples, self.pixels);
+                (factor * self.noise[i] / gain).max(samples * rare)
             }
+        };
+        let noise = core::array::from_fn(|i| match i {
+            0 => self.noise[0] * paths.error / of_trial,
+            _ => beside(i, 1.0),
         });
         let without_lobes = (!self.has_lobes).then_some("records serve no lobe of the scene");
+        let gain = self.gains.beside_records(self.has_photons);
         let cached = |supply, without: Option<_>| {
-            let row = self.cached(supply, work, &noise);
+            let row = self.cached(supply, work, &noise, beside(supply, gain));
             without.map_or(row, |reason| Row::without(row.kind, reason))
         };
         let merges = light_paths.is_ok_and(|choice| choice.counts.merging);
@@ -146,6 +155,7 @@ impl Trial {
                 if choice.counts.light_paths > 0.0 =>
             {
                 let samples = work / f64::from(rays);
+                let noise = noise.reduced(self.gains.samples);
                 let error = noise.error(samples / LIGHT_PATHS_ERROR, self.pixels);
                 Row { error, work: rays.into(), ..Row::without(kind, choice.light_paths) }
             }
@@ -155,7 +165,7 @@ impl Trial {
         let photons = match photons {
             Err(reason) => Row::without(ProgressivePhotons, reason),
             Ok(pilot) => Row {
-                error: PROGRESSIVE_ERROR * pilot.error(work),
+                error: PROGRESSIVE_ERROR * pilot.reduced(self.gains.samples).error(work),
                 work: pilot.work,
                 ..Row::without(ProgressivePhotons, "noise and blur of its first samples")
             },

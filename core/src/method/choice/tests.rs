@@ -18,6 +18,7 @@ const TRIAL: Trial = Trial {
     triangles: 100,
     caches: TrialCaches { resolution: None, shards: 1, lobes: LobeSettings::DEFAULT },
     has_photons: false,
+    gains: NoiseGains::NONE,
 };
 
 const GOAL: Goal = Goal { rays: Some(9e7), samples: None, error: None };
@@ -45,6 +46,30 @@ fn rare_light_is_that_of_records_or_stays_with_paths() {
     // The noise of path tracing is the same where light paths are no choice.
     assert_eq!(best(Ok(without(20.0))), Path);
     assert_eq!(best(Ok(without(0.05))), IrradianceCache);
+}
+
+#[test]
+fn a_reconstruction_reduces_noise_of_samples_and_leaves_that_of_records() {
+    let gains = NoiseGains { samples: 4.0, beside_photons: 2.0 };
+    // Ratios of the errors of all rows.
+    let compared = |noise, has_photons| {
+        let errors = |gains| {
+            let pilot = MethodPilot { noise: 1.0, blur: 0.1, work: 6.0 };
+            let trial = Trial { noise, has_photons, gains, ..TRIAL };
+            trial.table(&GOAL, None, Ok(light_paths(0.05)), Ok(pilot)).0.map(|row| row.error)
+        };
+        let [raw, reconstructed] = [NoiseGains::NONE, gains].map(errors);
+        core::array::from_fn::<_, { super::ROWS }, _>(|row| raw[row] / reconstructed[row])
+    };
+    let near = |ratio: f64, expected: f64| (ratio / expected - 1.0).abs() < 1e-3;
+    let [path, cache, _, light_paths, photons] = compared([20.0, 0.1, 0.1], false);
+    assert!(near(path, 4.0) && near(light_paths, 4.0), "{path} {light_paths}");
+    assert!((1.0..2.0).contains(&cache), "records have most of the noise: {cache}");
+    assert!((1.0..3.9).contains(&photons), "blur stays: {photons}");
+    let [_, cache, ..] = compared([20.0, 19.9, 19.9], false);
+    assert!((3.0..4.0).contains(&cache), "samples have most of the noise: {cache}");
+    let [path, cache, ..] = compared([20.0, 19.9, 19.9], true);
+    assert!(near(path, 4.0) && (1.5..2.0).contains(&cache), "beside photons: {path} {cache}");
 }
 
 #[test]

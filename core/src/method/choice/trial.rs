@@ -2,6 +2,7 @@
 //! an irradiance cache supplies the indirect light of diffuse surfaces, and by one in which records supply
 //! the light of rough lobes, too. It measures the variance and the rays of each.
 
+use super::NoiseGains;
 use super::goal::SAMPLES;
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -90,6 +91,8 @@ pub struct Trial {
     pub caches: TrialCaches,
     /// Whether caustic photons belong to the picture.
     pub has_photons: bool,
+    /// Gains by a reconstruction of the picture.
+    pub gains: NoiseGains,
 }
 
 /// Working memory of a worker.

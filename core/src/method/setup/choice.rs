@@ -8,7 +8,7 @@ use crate::findings::Finding;
 use crate::memory::{MemorySource, OutOfMemory};
 use crate::method::bidirectional::BidirectionalSettings;
 use crate::method::caustics::CausticPathTracing;
-use crate::method::choice::{MethodPilot, Trial, TrialCaches};
+use crate::method::choice::{MethodPilot, NoiseGains, Trial, TrialCaches};
 use crate::method::sppm::ProgressivePhotonMapping;
 use crate::method::{Executor, RenderMethod, caustics, counts};
 use crate::transport::PathSettings;
@@ -36,6 +36,8 @@ pub(super) fn choose<'a: 'm, 'm, F: Features>(
     let resolution = (!setup.has_open_cache()).then(|| options.cache.resolution());
     let caches = TrialCaches { resolution, shards: setup.shards, lobes: options.lobes };
     let Some(trial) = Trial::run(context, paths, &caches, memory, executor)? else { return Ok(None) };
+    let gains = if setup.is_reconstructed { NoiseGains::OF_RECONSTRUCTION } else { NoiseGains::NONE };
+    let trial = Trial { gains, ..trial };
     // Photons of paths and caches have the light of merges, and no blur that lasts as long as the picture.
     let merging = options.bidirectional.merging.or(Some(false));
     let techniques = BidirectionalSettings { merging, ..options.bidirectional };

@@ -39,6 +39,8 @@ pub struct MethodSetup<'a, 's> {
     pub reserve: [usize; 2],
     /// True if biased methods are audited, so that they may be chosen.
     pub is_audited: bool,
+    /// True if the picture is reconstructed, so that the noise of its samples counts less.
+    pub is_reconstructed: bool,
     /// Records that caches begin with.
     pub kept: KeptCaches<'s>,
     /// True if records become wider where there was no time to fill the caches. Records in files do not.

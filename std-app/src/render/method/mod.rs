@@ -93,6 +93,7 @@ fn of_core<'a, 's, F: Features>(setup: &RenderSetup<'a>, kept: KeptCaches<'s>) -
         shards: settings.shard.count,
         reserve: [false, true].map(|is_biased| ThreadedAudit::<F>::bytes(setup, is_biased)),
         is_audited: audit_fraction(settings.audit, true).is_some(),
+        is_reconstructed: settings.is_reconstructed(),
         kept,
         widens: !keeps_records,
         has_fixed_records: settings.load_cache.is_some() || keeps_records,
