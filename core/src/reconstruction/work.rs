@@ -138,9 +138,10 @@ impl<'m> Reconstruction<'m> {
             return None;
         }
         let level = level(halves);
-        for (whole, surfaces) in self.whole.iter_mut().zip(halves.surfaces) {
-            *whole = surfaces.whole();
-        }
+        for_pieces(executor, self.whole, self.size[0], |y, row| {
+            let surfaces = halves.surfaces[y * halves.size[0]..].iter();
+            row.iter_mut().zip(surfaces).for_each(|(whole, surfaces)| *whole = surfaces.whole());
+        });
         self.spread_fireflies(halves, executor);
         self.fit(halves, executor);
         self.weigh(halves, level, executor);
