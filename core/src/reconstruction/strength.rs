@@ -64,8 +64,8 @@ impl Step<'_> {
     }
 }
 
-/// Weights of errors in the sums for strengths, of a pixel whose samples have this light. A highlight that the
-/// weights do not know would rule the strengths around. Strengths may have any weights.
+/// Weights of errors in the sums for strengths, of a pixel whose samples have this light. A highlight that
+/// the weights do not know would rule the strengths around. Strengths may have any weights.
 #[inline]
 pub(super) fn limited(weights: [f32; 3], light: [f32; 3]) -> [f32; 3] {
     core::array::from_fn(|c| weights[c].min(MOST_RATIO / (light[c] * light[c] + LEAST_LIGHT)))
