@@ -11,12 +11,12 @@ pub(super) const STEPS: usize = 6;
 
 /// Half widths in pixels of the sums for strengths of whole pixels and mixed ones, by step.
 const RADII: [[f32; 2]; STEPS] =
-    [[24.0, 43.0], [15.0, 22.0], [11.0, 22.0], [40.0, 60.0], [8.0, 16.0], [28.0, 56.0]];
+    [[24.0, 43.0], [15.0, 22.0], [11.0, 22.0], [48.0, 72.0], [8.0, 16.0], [28.0, 56.0]];
 
 /// Standard errors within which the finer picture wins: weights of errors see little of the bias of coarser
-/// ones. Guided means follow noise that pixels nearby share, so that they win only by half a standard error.
+/// ones. Guided means follow noise that pixels nearby share, so that they win only by a standard error.
 /// None in the last step, where few highlights that were spread have large ones.
-const DOUBTS: [f64; STEPS] = [0.6, 0.6, 0.6, -0.5, 0.5, 0.0];
+const DOUBTS: [f64; STEPS] = [0.6, 0.6, 0.6, -1.0, 0.5, 0.0];
 
 /// The same where pixels further away judge, which say less of the bias of a place.
 const DOUBTS_OF_DISTANT: [f64; STEPS] = [1.0, 1.0, 1.0, 1.0, 1.0, 0.0];
