@@ -34,7 +34,7 @@ pub(super) fn light(view: &View, [x, y]: [usize; 2]) -> Both {
 }
 
 /// Fraction of two pixels that sees the same clusters.
-fn common(a: &PixelSurfaces, b: &PixelSurfaces) -> f32 {
+pub(super) fn common(a: &PixelSurfaces, b: &PixelSurfaces) -> f32 {
     let of_a = |(cluster, fraction): (u32, f32)| {
         let same = b.parts().filter(move |(other, _)| *other == cluster);
         same.map(|(_, other)| other.min(fraction)).sum::<f32>()

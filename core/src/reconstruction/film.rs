@@ -1,9 +1,10 @@
 //! Reconstruction of a film: its halves row by row, in a unit in which their mean is about one.
 
 use super::error::ReconstructionError;
-use super::passes::for_both;
+use super::halves::Halves;
+use super::passes::for_pieces;
 use super::surfaces::PixelSurfaces;
-use super::work::{Halves, Reconstructed, Reconstruction};
+use super::work::{Reconstructed, Reconstruction};
 use super::{Both, VALUES};
 use super::{FirstSurfaces, SurfaceComponents};
 use crate::Rgb;
@@ -58,6 +59,8 @@ pub struct FilmReconstruction<'m> {
     surfaces: &'m [PixelSurfaces],
     values: &'m mut [Both],
     groups: &'m mut [u8],
+    /// True if the groups are those of the surfaces and of `is_shared`.
+    has_groups: bool,
     memory: Reconstruction<'m>,
     size: [u32; 2],
     unit: f32,
@@ -132,6 +135,7 @@ impl<'m> FilmReconstruction<'m> {
             surfaces,
             values,
             groups,
+            has_groups: false,
             memory,
             size,
             unit: 1.0,
@@ -145,7 +149,7 @@ impl<'m> FilmReconstruction<'m> {
     /// further away judge them.
     #[must_use]
     pub fn shared(self, is_shared: bool) -> Self {
-        Self { is_shared, ..self }
+        Self { is_shared, has_groups: false, ..self }
     }
 
     /// Reconstructs `film`, whose own error is `raw`, if that makes the error smaller.
@@ -166,31 +170,38 @@ impl<'m> FilmReconstruction<'m> {
     ) -> Result<Reconstructed, NotReconstructed> {
         let (unit, parts) = measure(film)?;
         (self.unit, self.parts) = (unit, parts);
-        let [width, height] = self.size;
-        let across = width as usize;
-        let Self { surfaces, values, groups, is_shared, .. } = self;
-        let (surfaces, is_shared) = (&**surfaces, *is_shared);
-        for_both(executor, (values, across), (groups, across), |y, values, groups| {
-            for (x, (value, group)) in values.iter_mut().zip(groups).enumerate() {
-                let (x, y) = (x as u32, y as u32);
-                let pixel = film.pixel(x, y);
+        self.find_groups(executor);
+        let [width, height] = self.size.map(|size| size as usize);
+        let Self { surfaces, values, groups, memory, is_shared, .. } = self;
+        for_pieces(executor, values, width, |y, values| {
+            for (x, value) in values.iter_mut().enumerate() {
+                let pixel = film.pixel(x as u32, y as u32);
                 let [a, b] = [pixel.even.mean(), pixel.odd.mean()].map(|mean| mean / unit);
                 *value = [a.x, a.y, a.z, b.x, b.y, b.z];
-                *group = match is_shared {
-                    true => u8::from(is_near_edge(surfaces, [width, height], [x, y])),
-                    false => {
-                        let place = Tile::position([width, height], x, y) % PIXELS_PER_TILE;
-                        (Tile::group(place) & 1) as u8
-                    }
-                };
             }
         });
-        let Self { surfaces, values, groups, memory, is_shared, .. } = self;
-        let is_shared = *is_shared;
-        let size = [across, height as usize];
+        let (size, is_shared) = ([width, height], *is_shared);
         memory
             .run(&Halves { size, values, parts, groups, surfaces, is_shared }, executor)
             .ok_or(NotReconstructed::FewSamples)
+    }
+
+    /// Groups of the pixels, once: surfaces stay.
+    fn find_groups(&mut self, executor: &mut impl Executor) {
+        if core::mem::replace(&mut self.has_groups, true) {
+            return;
+        }
+        let Self { surfaces, groups, is_shared, size, .. } = self;
+        let (surfaces, is_shared, size) = (&**surfaces, *is_shared, *size);
+        for_pieces(executor, groups, size[0] as usize, |y, groups| {
+            for (x, group) in groups.iter_mut().enumerate() {
+                let (x, y) = (x as u32, y as u32);
+                *group = match is_shared {
+                    true => u8::from(is_near_edge(surfaces, size, [x, y])),
+                    false => (Tile::group(Tile::position(size, x, y) % PIXELS_PER_TILE) & 1) as u8,
+                };
+            }
+        });
     }
 
     /// Result of the last [`FilmReconstruction::update`].
@@ -211,7 +222,7 @@ impl<'m> FilmReconstruction<'m> {
         let finding = Finding::new(TOPIC, Decision::Used, "");
         let finding =
             numbers.into_iter().fold(finding, |all, (name, value)| all.with(name, Value::Number(value)));
-        let names = ["blocks_of_48", "blocks_of_24", "blocks_of_12", "blocks_of_6", "pixels"];
+        let names = ["blocks_of_48", "blocks_of_24", "blocks_of_12", "blocks_of_6", "guided_means", "pixels"];
         let fractions = names.into_iter().zip(fractions);
         fractions.fold(finding, |all, (name, fraction)| all.with(name, Value::Fraction(fraction)))
     }

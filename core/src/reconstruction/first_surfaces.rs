@@ -9,6 +9,7 @@
 
 use super::chains::{Batch, Chains, Seen};
 use super::components::SurfaceComponents;
+use super::passes::for_pieces;
 use super::surfaces::{NO_CLUSTER, PixelSurfaces, SLOTS};
 use crate::bsdf::Features;
 use crate::geometry::Ray;
@@ -101,12 +102,17 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
         }
 
         let clusters = &*clusters;
-        let edges = (0..self.pixels()).filter(|&i| self.is_at_edge(clusters, i)).count();
+        for_pieces(executor, rims, band, |number, edges| {
+            edges.iter_mut().zip(number * band..).for_each(|(edge, i)| {
+                *edge = u8::from(self.is_at_edge(clusters, i));
+            });
+        });
+        let edges: usize = rims.iter().map(|edge| usize::from(*edge)).sum();
         let segments = passed.counters.rays as f64 / (RAYS * self.pixels()) as f64;
         let rays = edge_rays(self.pixels() as f64, edges as f64 * segments);
         let bands = pixels.chunks_mut(band).zip(rims.chunks_mut(band));
         let passed = executor.pass(bands, |number, (pixels, rims), worker| {
-            self.refine_band(number * band, (pixels, rims), clusters, rays, &mut worker.scratch)
+            self.refine_band(number * band, (pixels, rims), rays, &mut worker.scratch)
         })?;
         if !passed.is_complete {
             return Ok(None);
@@ -164,13 +170,13 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
         Ok(counters)
     }
 
-    /// Second pass: fractions of the clusters of pixels at edges, by `rays` rays. Marks the rims of lamps.
+    /// Second pass: fractions of the clusters of pixels at edges, which `rims` marks, by `rays` rays. It leaves
+    /// the marks of the rims of lamps.
     #[inline(never)]
     fn refine_band(
         &self,
         first: usize,
         (pixels, rims): (&mut [PixelSurfaces], &mut [u8]),
-        clusters: &[u32],
         rays: usize,
         scratch: &mut Arena,
     ) -> Result<Counters, OutOfMemory> {
@@ -178,15 +184,19 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
         let mut batch = Batch::new(BATCH, &mut arena)?;
         let numbers = arena.slice::<u32>(EDGE_RAYS[0])?;
         let mut counters = Counters::default();
-        rims.fill(0);
         let mut chosen = [0; BATCH / EDGE_RAYS[1]];
         let capacity = BATCH / rays.max(1);
-        let mut at_edges = (0..pixels.len()).filter(|i| self.is_at_edge(clusters, first + i)).peekable();
-        while at_edges.peek().is_some() {
+        let mut next = 0;
+        loop {
             let mut count = 0;
-            for (slot, i) in chosen.iter_mut().take(capacity).zip(&mut at_edges) {
+            let at_edges = (next..).zip(rims.iter().skip(next)).filter(|(_, edge)| **edge != 0);
+            for (slot, (i, _)) in chosen.iter_mut().take(capacity).zip(at_edges) {
                 *slot = i;
+                next = i + 1;
                 count += 1;
+            }
+            if count == 0 {
+                break;
             }
             let index = |n: usize| first + chosen.get(n).copied().unwrap_or(0);
             counters.rays += self.trace(&mut batch, count, rays, false, index);

@@ -9,9 +9,10 @@
 //! 2. Polynomials are fitted to each cluster of surfaces in overlapping blocks of four sides ([`fit`],
 //!    [`scale`]); mixed pixels take the fits of their clusters by fractions, those without a fit the mean of
 //!    pixels alike ([`alike`]).
-//! 3. From the largest blocks to single pixels, each step moves towards the finer picture as far as the other
-//!    group of pixels nearby finds that this reduces the squared error ([`strength`]).
-//! 4. The error of the result is summed with robust weights ([`weights`], [`error`]).
+//! 3. The finest fits guide means of pixels nearby with alike light ([`guided`]).
+//! 4. From the largest blocks to these means and to single pixels, each step moves towards the finer picture
+//!    as far as the other group of pixels nearby finds that this reduces the squared error ([`strength`]).
+//! 5. The error of the result is summed with robust weights ([`weights`], [`error`]).
 
 mod alike;
 mod chains;
@@ -21,6 +22,8 @@ mod error;
 mod film;
 mod first_surfaces;
 mod fit;
+mod guided;
+mod halves;
 mod layers;
 mod passes;
 mod scale;
@@ -34,10 +37,11 @@ pub use components::SurfaceComponents;
 pub use error::{ReconstructionError, SquareError};
 pub use film::{FilmReconstruction, LEAST_SAMPLES, NotReconstructed, TOPIC};
 pub use first_surfaces::FirstSurfaces;
+pub use halves::Halves;
 pub use layers::{Coverage, NO_ID, PixelLayers, RANKS};
 pub(crate) use passes::for_pieces;
 pub use surfaces::{NO_CLUSTER, PixelSurfaces};
-pub use work::{FRACTIONS, Halves, Reconstructed, Reconstruction};
+pub use work::{FRACTIONS, Reconstructed, Reconstruction};
 
 /// Values of a pixel: three channels of each half.
 const VALUES: usize = 6;

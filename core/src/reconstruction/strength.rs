@@ -25,6 +25,12 @@ pub(super) const KINDS: usize = 4;
 /// Strengths of a cell for pixels of each group and kind.
 pub(super) type CellStrengths = [f32; KINDS];
 
+/// Largest ratio of a weight of strengths to that of the light of the samples.
+const MOST_RATIO: f32 = 4.0;
+
+/// Least squared light.
+const LEAST_LIGHT: f32 = 1e-12;
+
 /// Least quadratic coefficient.
 const LEAST_SQUARE: f64 = 1e-12;
 
@@ -56,6 +62,13 @@ impl Step<'_> {
         }
         [linear, square]
     }
+}
+
+/// Weights of errors in the sums for strengths, of a pixel whose samples have this light. A highlight that
+/// the weights do not know would rule the strengths around. Strengths may have any weights.
+#[inline]
+pub(super) fn limited(weights: [f32; 3], light: [f32; 3]) -> [f32; 3] {
+    core::array::from_fn(|c| weights[c].min(MOST_RATIO / (light[c] * light[c] + LEAST_LIGHT)))
 }
 
 /// Cells of `side` pixels along an axis.
@@ -152,6 +165,25 @@ pub(super) fn at(
     };
     let [a, b] = [row(top), row(bottom)];
     a + v * (b - a)
+}
+
+/// Fractions of a pixel by origin: the picture before the first step, and the finer ones. The last step, of
+/// fireflies, is none of them.
+pub(super) fn origins<const N: usize>(
+    (strengths, cell): (&[CellStrengths], usize),
+    grid: [usize; 2],
+    pixel: [usize; 2],
+    kind: usize,
+) -> [f32; N] {
+    let (mut fractions, mut rest) = ([0.0; N], 1.0);
+    let steps = strengths.chunks(grid[0] * grid[1]).zip(&mut fractions[1..]);
+    for (strengths, fraction) in steps.rev() {
+        let strength = at((strengths, cell), grid, pixel, kind);
+        *fraction = rest * (1.0 - strength);
+        rest *= strength;
+    }
+    fractions[0] = rest;
+    fractions
 }
 
 /// F + ρ (H − F).

@@ -2,14 +2,15 @@
 
 use super::error::{ReconstructionError, SQUARE, SquareError, of_pixel, sum_squares, total};
 use super::fit::View;
+use super::halves::{Halves, STEPS, level};
 use super::passes::{for_both, for_pieces};
 use super::scale::{Scale, Shape};
 use super::strength::{
-    self, CELL, CellStrengths, CellSums, Judges, KINDS, Step, cells, kind, mixed, strengths,
+    self, CELL, CellStrengths, CellSums, KINDS, Step, cells, kind, limited, mixed, strengths,
 };
 use super::surfaces::PixelSurfaces;
 use super::weights::{mean, weights};
-use super::{Both, VALUES, alike, despike};
+use super::{Both, VALUES, alike, despike, guided};
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::method::Executor;
@@ -28,72 +29,12 @@ const WIDE: Shape = Shape { side: 24, degree: 0, slots: 8 };
 /// Scale of the weights of errors.
 const MIDDLE: usize = 2;
 
-/// Steps: to the three finer scales, to single pixels without fireflies, and to single pixels.
-const STEPS: usize = SHAPES.len() + 1;
-
 /// Steps of large blocks, whose bias is measured against the finest fits in place of single pixels.
 const BY_FITS: usize = 2;
 
-/// Half widths in pixels of the sums for strengths of whole pixels and mixed ones, by step.
-const RADII: [[f32; 2]; STEPS] = [[24.0, 43.0], [15.0, 22.0], [11.0, 22.0], [8.0, 16.0], [28.0, 56.0]];
-
-/// Standard errors within which the finer picture wins: weights of errors see little of the bias of coarser
-/// ones. None in the last step, where few highlights that were spread have large ones.
-const DOUBTS: [f64; STEPS] = [0.5, 0.5, 0.5, 0.5, 0.0];
-
-/// The same where pixels further away judge, which say less of the bias of a place.
-const DOUBTS_OF_DISTANT: [f64; STEPS] = [1.0, 1.0, 1.0, 1.0, 0.0];
-
-/// Pixels with errors in common: cells along the longer side of the picture, cells on each side that do not
-/// judge, and half widths of the sums in cells. Supports of records are a part of the picture.
-const CELLS: usize = 24;
-const HOLE: usize = 4;
-const REACH: [usize; 2] = [12, 15];
-
-/// Fractions of a picture by origin: the scales from the largest, and single pixels.
-pub const FRACTIONS: usize = STEPS;
-
-/// The halves of a picture, row by row from the top.
-#[derive(Clone, Copy, Debug)]
-pub struct Halves<'p> {
-    /// Pixels across and down.
-    pub size: [usize; 2],
-    /// Means of the halves of each pixel; the mean over pixels is about one.
-    pub values: &'p [Both],
-    /// Fractions of the samples that the halves have.
-    pub parts: [f32; 2],
-    /// Group of each pixel, 0 or 1: groups share no noise, unless `is_shared`.
-    pub groups: &'p [u8],
-    /// Surfaces that each pixel sees.
-    pub surfaces: &'p [PixelSurfaces],
-    /// True if pixels nearby have errors in common: then those further away of the same group choose the
-    /// strengths.
-    pub is_shared: bool,
-}
-
-impl Halves<'_> {
-    /// Side in pixels of the cells of strengths.
-    fn cell(&self) -> usize {
-        let [width, height] = self.size;
-        if self.is_shared { (width.max(height) / CELLS).max(CELL) } else { CELL }
-    }
-
-    /// Pixels that choose the strengths of a step.
-    fn judges(&self, step: usize) -> Judges {
-        let cell = self.cell();
-        let radii = REACH.map(|reach| (reach * cell) as f32);
-        match self.is_shared {
-            true => Judges { radii, cell, hole: Some(HOLE), doubt: DOUBTS_OF_DISTANT[step] },
-            false => Judges { radii: RADII[step], cell, hole: None, doubt: DOUBTS[step] },
-        }
-    }
-
-    fn is_whole(&self) -> bool {
-        let pixels = self.size[0] * self.size[1];
-        let lengths = [self.values.len(), self.groups.len(), self.surfaces.len()];
-        pixels > 0 && lengths.iter().all(|length| *length == pixels)
-    }
-}
+/// Fractions of a picture by origin: the scales from the largest, guided means, and single pixels.
+pub const FRACTIONS: usize = SHAPES.len() + 2;
+const _: () = assert!(FRACTIONS == STEPS);
 
 /// Memory and result of a reconstruction.
 pub struct Reconstruction<'m> {
@@ -107,6 +48,8 @@ pub struct Reconstruction<'m> {
     fine: &'m mut [Both],
     /// The finest fits.
     finest: &'m mut [Both],
+    /// Noise of both halves around each pixel.
+    noise: &'m mut [[f32; 2]],
     weights: &'m mut [[f32; 3]],
     wide: Scale<'m>,
     scales: [Scale<'m>; SHAPES.len()],
@@ -115,6 +58,8 @@ pub struct Reconstruction<'m> {
     holed: &'m mut [CellSums],
     strengths: &'m mut [CellStrengths],
     squares: &'m mut [SquareError],
+    /// Sums of rows of the fractions by origin.
+    fractions: &'m mut [[f64; FRACTIONS]],
 }
 
 /// Result of a reconstruction.
@@ -122,7 +67,8 @@ pub struct Reconstruction<'m> {
 pub struct Reconstructed {
     /// Error of the result.
     pub error: ReconstructionError,
-    /// Fractions of the picture that come from blocks of 48, 24, 12 and 6 pixels, and from single pixels.
+    /// Fractions of the picture that come from blocks of 48, 24, 12 and 6 pixels, from guided means, and from
+    /// single pixels.
     pub fractions: [f64; FRACTIONS],
 }
 
@@ -137,13 +83,15 @@ impl<'m> Reconstruction<'m> {
             .slice::<Both>(pixels)
             .slice::<Both>(pixels)
             .slice::<Both>(pixels)
+            .slice::<[f32; 2]>(pixels)
             .slice::<[f32; 3]>(pixels);
         let sums = Footprint::default()
             .slice::<CellSums>(grid)
             .slice::<CellSums>(grid)
             .slice::<CellSums>(grid)
             .slice::<CellStrengths>(grid.saturating_mul(STEPS))
-            .slice::<SquareError>(squares);
+            .slice::<SquareError>(squares)
+            .slice::<[f64; FRACTIONS]>(size[1]);
         let scales = SHAPES.map(|shape| Scale::footprint(size, shape));
         let scales = scales.into_iter().fold(Scale::footprint(size, WIDE), Footprint::and);
         planes.and(scales).and(sums)
@@ -159,7 +107,7 @@ impl<'m> Reconstruction<'m> {
         let whole = arena.slice(pixels)?;
         let (even, picture) = (arena.slice(pixels)?, arena.slice(pixels)?);
         let (fine, finest) = (arena.slice(pixels)?, arena.slice(pixels)?);
-        let weights = arena.slice(pixels)?;
+        let (noise, weights) = (arena.slice(pixels)?, arena.slice(pixels)?);
         let wide = Scale::new(size, WIDE, arena)?;
         let [a, b, c, d] = SHAPES;
         let mut scale = |shape| Scale::new(size, shape, arena);
@@ -171,6 +119,7 @@ impl<'m> Reconstruction<'m> {
             picture,
             fine,
             finest,
+            noise,
             weights,
             wide,
             scales,
@@ -179,6 +128,7 @@ impl<'m> Reconstruction<'m> {
             holed: arena.slice(grid)?,
             strengths: arena.slice(grid.saturating_mul(STEPS))?,
             squares: arena.slice(squares)?,
+            fractions: arena.slice(size[1])?,
         })
     }
 
@@ -188,9 +138,10 @@ impl<'m> Reconstruction<'m> {
             return None;
         }
         let level = level(halves);
-        for (whole, surfaces) in self.whole.iter_mut().zip(halves.surfaces) {
-            *whole = surfaces.whole();
-        }
+        for_pieces(executor, self.whole, self.size[0], |y, row| {
+            let surfaces = halves.surfaces[y * halves.size[0]..].iter();
+            row.iter_mut().zip(surfaces).for_each(|(whole, surfaces)| *whole = surfaces.whole());
+        });
         self.spread_fireflies(halves, executor);
         self.fit(halves, executor);
         self.weigh(halves, level, executor);
@@ -210,7 +161,7 @@ impl<'m> Reconstruction<'m> {
         let of_pixel = |i: usize| of_pixel(&picture[i], &halves.values[i], &weights[i], product);
         sum_squares([width, height], squares, of_pixel, executor);
         let error = total([width, height], squares, halves.is_shared);
-        Some(Reconstructed { error, fractions: self.fractions(halves) })
+        Some(Reconstructed { error, fractions: self.fractions(halves, executor) })
     }
 
     /// Reconstructed light of both halves.
@@ -255,9 +206,9 @@ impl<'m> Reconstruction<'m> {
         });
     }
 
-    /// Fits of all scales, and the finest picture.
+    /// Fits of all scales, the finest picture, and the noise around it.
     fn fit(&mut self, halves: &Halves, executor: &mut impl Executor) {
-        let Self { size: [width, height], whole, even, finest, scales, .. } = self;
+        let Self { size: [width, height], whole, even, finest, noise, scales, .. } = self;
         let (width, height) = (*width, *height);
         let view = View { width, height, values: even, surfaces: halves.surfaces, whole };
         scales.iter_mut().for_each(|scale| scale.fit(view, executor));
@@ -272,6 +223,10 @@ impl<'m> Reconstruction<'m> {
                     (None, false) => alike::light(&view, [x, y]),
                 };
             }
+        });
+        let finest = &**finest;
+        for_pieces(executor, noise, width, |y, row| {
+            row.iter_mut().enumerate().for_each(|(x, out)| *out = guided::noise(&view, finest, [x, y]));
         });
     }
 
@@ -305,9 +260,12 @@ impl<'m> Reconstruction<'m> {
 
     /// Moves the picture towards the finer one of this step.
     fn step(&mut self, halves: &Halves, step: usize, executor: &mut impl Executor) {
-        let Self { size: [width, height], even, picture, fine, finest, weights, scales, .. } = self;
-        let cell = halves.cell();
-        let (width, grid) = (*width, [cells(*width, cell), cells(*height, cell)]);
+        let Self {
+            size: [width, height], whole, even, picture, fine, finest, noise, weights, scales, ..
+        } = self;
+        let (width, height, cell) = (*width, *height, halves.cell());
+        let grid = [cells(width, cell), cells(height, cell)];
+        let view = View { width, height, values: even, surfaces: halves.surfaces, whole };
         let Self { sums, rows, holed, strengths: all, .. } = self;
         let product = halves.parts[0] * halves.parts[1];
         let coarse = &**picture;
@@ -321,12 +279,18 @@ impl<'m> Reconstruction<'m> {
                 let surfaces = &halves.surfaces[i];
                 let raw = &halves.values[i];
                 *fine = match step + 1 {
-                    next if next < SHAPES.len() => light(&scales[next..], surfaces, [x, y], &finest[i]),
-                    SHAPES_END => even[i],
+                    FINEST => finest[i],
+                    next if next < FINEST => light(&scales[next..], surfaces, [x, y], &finest[i]),
+                    GUIDED => guided::light(&view, finest, noise, [x, y]),
+                    SINGLE => even[i],
                     _ => core::array::from_fn(|c| coarse[i][c] + raw[c] - even[i][c]),
                 };
                 let reference = if step < BY_FITS { &finest[i] } else { raw };
-                let step = Step { coarse: &coarse[i], fine, reference, weights: &weights[i] };
+                let weights = match step + 1 {
+                    STEPS => weights[i],
+                    _ => limited(weights[i], mean(raw, halves.parts)),
+                };
+                let step = Step { coarse: &coarse[i], fine, reference, weights: &weights };
                 let [linear, square] = step.coefficients(product).map(f64::from);
                 let sum = &mut sums[x / cell][kind(halves.groups[i], surfaces.is_whole())];
                 sum[0] += linear;
@@ -347,30 +311,30 @@ impl<'m> Reconstruction<'m> {
         });
     }
 
-    /// Mean fractions by origin. The last step moves fireflies alone.
-    fn fractions(&self, halves: &Halves) -> [f64; FRACTIONS] {
-        let [width, height] = self.size;
-        let cell = halves.cell();
-        let grid = [cells(width, cell), cells(height, cell)];
-        let of_step = grid[0] * grid[1];
-        let mut sums = [0.0; FRACTIONS];
-        for (i, surfaces) in halves.surfaces.iter().enumerate() {
-            let kind = kind(halves.groups[i], surfaces.is_whole());
-            let mut rest = 1.0;
-            for step in (1..FRACTIONS).rev() {
-                let strengths = &self.strengths[(step - 1) * of_step..][..of_step];
-                let strength = strength::at((strengths, cell), grid, [i % width, i / width], kind);
-                sums[step] += f64::from(rest * (1.0 - strength));
-                rest *= strength;
+    /// Mean fractions by origin.
+    fn fractions(&mut self, halves: &Halves, executor: &mut impl Executor) -> [f64; FRACTIONS] {
+        let Self { size: [width, height], strengths, fractions, .. } = self;
+        let (width, height, cell) = (*width, *height, halves.cell());
+        let (grid, strengths) = ([cells(width, cell), cells(height, cell)], &**strengths);
+        for_pieces(executor, fractions, 1, |y, row| {
+            let mut sums = [0.0; FRACTIONS];
+            for (x, i) in (0..width).zip(y * width..) {
+                let kind = kind(halves.groups[i], halves.surfaces[i].is_whole());
+                let of_pixel: [f32; FRACTIONS] = strength::origins((strengths, cell), grid, [x, y], kind);
+                (0..FRACTIONS).for_each(|origin| sums[origin] += f64::from(of_pixel[origin]));
             }
-            sums[0] += f64::from(rest);
-        }
-        sums.map(|sum| sum / (width * height) as f64)
+            row.fill(sums);
+        });
+        core::array::from_fn(|origin| {
+            fractions.iter().map(|row| row[origin]).sum::<f64>() / (width * height) as f64
+        })
     }
 }
 
-/// Number of the step to single pixels without fireflies, plus one.
-const SHAPES_END: usize = SHAPES.len();
+/// Numbers of the steps to the finest fits, guided means and single pixels without fireflies, plus one.
+const FINEST: usize = SHAPES.len() - 1;
+const GUIDED: usize = FINEST + 1;
+const SINGLE: usize = GUIDED + 1;
 
 /// Cells of strengths, and squares of errors.
 fn grids([width, height]: [usize; 2]) -> [usize; 2] {
@@ -378,13 +342,6 @@ fn grids([width, height]: [usize; 2]) -> [usize; 2] {
         cells(width, CELL).saturating_mul(cells(height, CELL)),
         width.div_ceil(SQUARE).saturating_mul(height.div_ceil(SQUARE)),
     ]
-}
-
-/// Mean of a picture over pixels and channels.
-fn level(halves: &Halves) -> f32 {
-    let of_pixel = |value: &Both| f64::from(mean(value, halves.parts).iter().sum::<f32>());
-    let sum: f64 = halves.values.iter().map(of_pixel).sum();
-    (sum / (3 * halves.values.len()) as f64) as f32
 }
 
 /// Light of a pixel by the first of `scales` that has it, else `finest`.

@@ -271,7 +271,7 @@ fn film<T>(
 }
 
 const HEAD: &str = "seed        raw  reconstructed  gain  told/true raw  told/true  same, true denominators  interval              \
-                    reference  mixed raw, reconstructed  seconds  fractions of 48, 24, 12, 6, 1 pixels";
+                    reference  mixed raw, reconstructed  seconds  fractions of 48, 24, 12, 6 pixels, guided means, 1 pixel";
 
 /// Errors of a picture.
 struct Row {
