@@ -4,7 +4,6 @@ use core::f64::consts::PI;
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
 use halflight::render::{self, Method, RenderResult, Settings, Stop};
-use halflight_core::Level;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
@@ -12,13 +11,14 @@ use halflight_core::film::{Dropped, Film, Pixel};
 use halflight_core::geometry::Ray;
 use halflight_core::memory::Arena;
 use halflight_core::sampling::Sampler;
-use halflight_core::scene::{Camera, Material, Scene, Surface, SurfacePoint};
+use halflight_core::scene::{Camera, Material, PointLight, Scene, Surface, SurfacePoint};
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::path::reference;
 use halflight_core::transport::{
     Counters, IrradiancePoint, LightPart, PathIntegrator, PathSettings, UNLIMITED,
 };
+use halflight_core::{Level, Rgb};
 use halflight_tests::memory::{TestArena, with_structures};
 use halflight_tests::render::raw;
 use halflight_tests::scenes::{
@@ -229,16 +229,30 @@ fn an_interrupted_picture_is_valid() {
 
 #[test]
 fn irradiance_at_points_is_the_textbook_to_the_bit_for_any_wave() {
-    for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0)] {
+    let mut lit = [1, 3, 40].map(|count| {
+        let mut buffers = everything();
+        buffers.lights.extend((0..count).map(|i| match i % 3 {
+            0 => PointLight::Point { position: Vec3::new(0.4, 0.6, 0.3), intensity: Rgb::splat(0.2) },
+            1 => PointLight::Directional { direction: Vec3::NEG_Y, irradiance: Rgb::splat(0.5) },
+            _ => PointLight::Point { position: Vec3::new(0.7, 0.9, 0.6), intensity: Rgb::splat(0.1) },
+        }));
+        buffers
+    });
+    lit[0].environment = None;
+    for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0)].into_iter().chain(lit) {
         let scene = buffers.scene();
         let settings = PathSettings { width: 1, height: 1, seed: 3, max_depth: UNLIMITED };
         with_structures(&scene, |bvh, lights| {
-            let tracer = PathIntegrator::<All>::new(&scene, bvh, lights, settings, Level::BASELINE);
+            let of_level = |level| PathIntegrator::<All>::new(&scene, bvh, lights, settings, level);
             let on = |triangle| IrradiancePoint::on_triangle(&scene, triangle, [0.3, 0.4], triangle % 2 == 0);
             let points: Vec<IrradiancePoint> =
                 (0..12).filter_map(on).zip(5..).map(|(point, number)| point.numbered(number)).collect();
-            for wave in [1, 100, 5000] {
-                let mut scratch_memory = TestArena::new(PathIntegrator::<All>::scratch(wave));
+            let waves = [1, 100, 5000].into_iter();
+            for (wave, level) in waves.flat_map(|wave| [Level::BASELINE, Level::detect()].map(|l| (wave, l)))
+            {
+                let footprint = PathIntegrator::<All>::scratch(wave);
+                let beside = PathIntegrator::<All>::scratch_of_points(points.len());
+                let (tracer, mut scratch_memory) = (of_level(level), TestArena::new(footprint.and(beside)));
                 let mut film = vec![Pixel::default(); points.len()];
                 tracer
                     .sample_irradiance(

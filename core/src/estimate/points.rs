@@ -110,6 +110,9 @@ fn mean_around(points: &[Option<Sums>], places: &[Place], i: usize) -> Option<f3
     for (j, (point, (p, n))) in points.iter().zip(places).enumerate() {
         let Some(point) = point.filter(|_| j != i) else { continue };
         let distance = p.distance_squared(position) + 0.5 * size * (1.0 - n.dot(normal));
+        if nearest[NEIGHBOURS - 1].0 <= distance {
+            continue;
+        }
         let mut entry = (distance, point.mean);
         for slot in &mut nearest {
             if entry.0 < slot.0 {

@@ -112,6 +112,7 @@ impl<'m> LightSampler<'m> {
             distant_table,
             environment_weight: if environment.is_some() { finite(sky) } else { 0.0 },
             distant_weight: if distant.is_empty() { 0.0 } else { finite(sun) },
+            leaves_out_delta: false,
         })
     }
 }

@@ -5,7 +5,7 @@ use super::environment_visibility::WarpedSample;
 use super::sampler::{LightSample, LightSampler, sample_emitter};
 use super::tree::ChosenBlock;
 use crate::sampling::ONE_MINUS_EPSILON;
-use crate::scene::{PointLight, Scene};
+use crate::scene::Scene;
 use crate::{Level, Rgb};
 use glam::Vec3;
 use halflight_simd::kernels::shade::direct::LightBlock;
@@ -27,6 +27,12 @@ pub(crate) enum ChosenLight<'m> {
 }
 
 impl ChosenLight<'_> {
+    /// True for a light without extent.
+    #[inline]
+    fn is_delta(&self) -> bool {
+        matches!(self, Self::Point { .. } | Self::Distant { .. })
+    }
+
     /// Makes an area light without texture the light of vertex `i` (below 16) of a block. Returns its first
     /// triangle, the probability of the choice and its number; `None` for other lights.
     #[inline]
@@ -82,6 +88,8 @@ impl<'m> LightSampler<'m> {
     #[inline]
     pub(crate) fn choose(&self, position: Vec3, normal: Vec3, choice: f32) -> Option<ChosenLight<'m>> {
         let shares = self.kind_probabilities(position, normal);
+        let [left_out, left] = self.kinds_left(&shares);
+        let choice = if self.leaves_out_delta { left_out + choice * left } else { choice };
         if choice < shares.tree {
             let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
             let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;
@@ -155,6 +163,9 @@ impl<'m> LightSampler<'m> {
         chosen: ChosenLight,
         warped: Option<WarpedSample>,
     ) -> Option<(LightSample, bool)> {
+        if self.leaves_out_delta && chosen.is_delta() {
+            return None;
+        }
         match chosen {
             ChosenLight::Emitter { emitter, light, probability } => {
                 let sample = sample_emitter(scene, emitter, position, normal, u, probability)?;
@@ -175,13 +186,8 @@ impl<'m> LightSampler<'m> {
             }
             ChosenLight::Distant { index, probability } => {
                 let light = (self.in_tree() + index) as u32;
-                match scene.lights.get(*self.distant.get(index)? as usize)? {
-                    PointLight::Directional { direction, irradiance } => {
-                        let sample = LightSample::far(-*direction, *irradiance, probability, light);
-                        Some((LightSample { delta: true, ..sample }, false))
-                    }
-                    _ => None,
-                }
+                let sample = self.sample_distant(scene, index, probability)?;
+                Some((LightSample { light, ..sample }, false))
             }
         }
     }

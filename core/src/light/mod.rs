@@ -4,6 +4,7 @@ mod area;
 mod border;
 mod build;
 mod choice;
+mod delta;
 mod disc;
 mod emission;
 mod emitted;

@@ -6,7 +6,7 @@
 
 use super::area::Emitter;
 use super::border::Edges;
-use super::emitted::{emitted_at, spot_falloff};
+use super::emitted::emitted_at;
 use super::environment::EnvironmentSampler;
 use super::environment_visibility::{EnvironmentVisibility, VisibilityTable, WarpedSample};
 use super::tree::Tree;
@@ -75,6 +75,8 @@ pub struct LightSampler<'m> {
     /// Irradiance of the environment and of directional lights, in the unit of the tree's powers.
     pub(super) environment_weight: f32,
     pub(super) distant_weight: f32,
+    /// True if delta lights are left out ([`LightSampler::without_delta_lights`]).
+    pub(super) leaves_out_delta: bool,
 }
 
 /// Probability of each kind of light.
@@ -127,7 +129,8 @@ impl<'m> LightSampler<'m> {
     /// True without lights.
     #[inline]
     pub fn is_empty(&self) -> bool {
-        self.in_tree() == 0 && self.environment.is_none() && self.distant.is_empty()
+        let has_delta = self.has_delta_lights() && !self.leaves_out_delta;
+        self.emitters.is_empty() && self.environment.is_none() && !has_delta
     }
 
     /// Samples a direction from which light may reach `position`. On a surface only the side of `normal`
@@ -225,11 +228,6 @@ impl<'m> LightSampler<'m> {
         });
     }
 
-    /// True if there are point or directional lights, which no path hits.
-    pub(crate) fn has_delta_lights(&self) -> bool {
-        !self.points.is_empty() || !self.distant.is_empty()
-    }
-
     /// Triangle of emitter `light`.
     pub(crate) fn triangle_of(&self, light: u32) -> Option<u32> {
         self.emitters.get(light as usize).map(|emitter| emitter.triangle)
@@ -317,33 +315,6 @@ impl<'m> LightSampler<'m> {
             if count == 1.0 { kinds[i] } else { kinds[i] * MIN_PROBABILITY + by_weight * relative[i] }
         };
         KindProbabilities { tree: share(0), environment: share(1), distant: share(2) }
-    }
-
-    pub(super) fn sample_point(
-        &self,
-        scene: &Scene,
-        light: u32,
-        from: Vec3,
-        probability: f32,
-    ) -> Option<LightSample> {
-        let index = *self.points.get(light as usize - self.emitters.len())?;
-        let (position, intensity) = match scene.lights.get(index as usize)? {
-            PointLight::Point { position, intensity } => (*position, *intensity),
-            PointLight::Spot { position, direction, intensity, cos_inner, cos_outer } => {
-                let cos = (from - *position).normalize_or_zero().dot(*direction);
-                (*position, *intensity * spot_falloff(cos, *cos_inner, *cos_outer))
-            }
-            PointLight::Directional { .. } => return None,
-        };
-        let to_light = position - from;
-        let distance = to_light.length();
-        let radiance = intensity / distance / distance;
-        if !(distance > 0.0 && radiance.max_element() > 0.0) {
-            return None;
-        }
-        let direction = to_light / distance;
-        let sample = LightSample::far(direction, radiance, probability, light);
-        Some(LightSample { distance, delta: true, ..sample })
     }
 }
 

@@ -62,7 +62,9 @@ pub struct IrradiancePoints<'a, F> {
 impl<'a, F: Features> IrradiancePoints<'a, F> {
     /// Working memory of a worker.
     pub fn scratch() -> Footprint {
-        PointReceivers::<F>::scratch().or(caustics::scratch::<F>()).or(CachedPoints::<F>::scratch())
+        let structures =
+            PointReceivers::<F>::scratch().or(caustics::scratch::<F>()).or(CachedPoints::<F>::scratch());
+        structures.and(PathIntegrator::<F>::scratch_of_points(PIXELS_PER_TILE))
     }
 
     /// Memory of photons in `scene` for so many points.

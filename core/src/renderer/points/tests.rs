@@ -1,6 +1,7 @@
 //! Irradiance with known answers, at points where sensors are put, in memory of the stated size.
 
 use super::{IrradianceRenderer, PointIrradiance, PointSettings};
+use crate::light::luminance;
 use crate::memory::{Arena, Line};
 use crate::method::Loop;
 use crate::renderer::{RenderError, Until};
@@ -112,6 +113,69 @@ fn a_point_light_gives_the_cosine_law() {
         assert!((value.irradiance / exact - Rgb::ONE).abs().max_element() < 1e-5, "{value:?}");
         assert!(value.upper - value.lower < 1e-4 * value.value());
     }
+}
+
+/// A point light, a spot and two directional lights, and their irradiance on a floor.
+const DELTA_LIGHTS: [PointLight; 4] = [
+    PointLight::Point { position: Vec3::new(0.0, 1.5, 0.0), intensity: Rgb::new(3.0, 2.0, 1.0) },
+    PointLight::Spot {
+        position: Vec3::new(0.5, 3.0, 0.0),
+        direction: Vec3::NEG_Y,
+        intensity: Rgb::splat(2.0),
+        cos_inner: 0.5,
+        cos_outer: 0.4,
+    },
+    PointLight::Directional { direction: Vec3::NEG_Y, irradiance: Rgb::splat(0.7) },
+    PointLight::Directional { direction: Vec3::new(0.6, -0.8, 0.0), irradiance: Rgb::new(1.0, 2.0, 0.0) },
+];
+
+fn of_delta_lights(point: &IrradiancePoint) -> Rgb {
+    let from = Vec3::from(point.position);
+    let near =
+        [(Vec3::new(0.0, 1.5, 0.0), Rgb::new(3.0, 2.0, 1.0)), (Vec3::new(0.5, 3.0, 0.0), Rgb::splat(2.0))];
+    let each = near.map(|(at, power)| power * at.y / at.distance(from).powi(3));
+    each[0] + each[1] + Rgb::splat(0.7) + 0.8 * Rgb::new(1.0, 2.0, 0.0)
+}
+
+#[test]
+fn lights_without_extent_beside_an_even_sky_have_no_noise() {
+    let (triangles, materials) = (triangles(&FLOOR), [Material::diffuse(Rgb::ZERO)]);
+    let points: Vec<_> = grid(0.0).into_iter().filter(|point| point.position[0].abs() < 1.0).collect();
+    for lights in [&DELTA_LIGHTS[..], &DELTA_LIGHTS[..2], &DELTA_LIGHTS[2..]] {
+        let all = Scene { lights, ..scene(&triangles, &materials) };
+        for level in [Level::BASELINE, Level::detect()] {
+            let settings = PointSettings { level, ..PointSettings::default() };
+            let found = with_settings(&all, &points, &settings, Until::Samples(4), 0).unwrap();
+            for (point, value) in points.iter().zip(found) {
+                let exact = match lights.len() {
+                    4 => Some(of_delta_lights(point) + Rgb::splat(2.0 * PI)),
+                    _ => None,
+                };
+                let is_exact =
+                    exact.is_none_or(|e| (value.irradiance / e - Rgb::ONE).abs().max_element() < 1e-5);
+                assert!(is_exact && value.upper - value.lower < 1e-4 * value.value(), "{value:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn lights_without_extent_add_to_the_light_of_a_lamp() {
+    let faces = [FLOOR[0], FLOOR[1], [8, 10, 9], [8, 11, 10]];
+    let mut triangles = triangles(&faces);
+    (triangles[2].material, triangles[3].material) = (1, 1);
+    let materials = [Material::diffuse(Rgb::ZERO), Material::lamp(Rgb::splat(20.0))];
+    let lamp = Scene { environment: None, ..scene(&triangles, &materials) };
+    let points = [IrradiancePoint::free(Vec3::new(-1.0, 0.0, -0.5), Vec3::Y)];
+    let of = |lights| {
+        let scene = Scene { lights, ..lamp };
+        values(&scene, &points, Until::Samples(1 << 10), 0).unwrap()[0]
+    };
+    let (alone, all) = (of(&[][..]), of(&DELTA_LIGHTS[..]));
+    let exact = luminance(of_delta_lights(&points[0]));
+    let half = |value: &PointIrradiance| value.upper - value.value();
+    assert!((all.value() - alone.value() - exact).abs() < 1.5 * (half(&alone) + half(&all)), "{all:?}");
+    assert!(half(&all) < 0.2 * alone.value() && alone.value() > 0.1, "{alone:?}");
 }
 
 #[test]

@@ -22,6 +22,7 @@ mod direct;
 pub(in crate::transport) mod estimator;
 mod lanes;
 pub(in crate::transport) mod pixels;
+mod point_samples;
 mod points;
 #[cfg(feature = "reference")]
 pub mod reference;

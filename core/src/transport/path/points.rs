@@ -1,33 +1,15 @@
-//! Irradiance at points by path tracing: each path starts at a point as if at a white diffuse surface, which
-//! reflects irradiance / π.
-//!
-//! The plain algorithm is [`crate::transport::path::reference::irradiance`]; both compute the same bits at
-//! the baseline level. The first vertex is shaded alone; the paths behind it advance as those of pixels do.
+//! Points with a normal at which irradiance is estimated, on surfaces or free.
 
-use super::PathIntegrator;
-use super::estimator::{LightEstimator, PathVertex, RemainingLight};
-use super::scalar::Path;
-use super::sharing::PathWave;
 use crate::Rgb;
 use crate::bsdf::{All, Bsdf, Diffuse, Features};
-use crate::bvh::Coherence;
-use crate::film::Pixel;
 use crate::geometry::{Frame, Hit, MISS, Ray};
-use crate::memory::{Arena, OutOfMemory};
-use crate::sampling::Sampler;
 use crate::scene::{Attributes, Material, Scene, SurfacePoint};
-use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::dimension;
-use crate::transport::walk::path_classes::PathClasses;
 use bytemuck::{Pod, Zeroable};
-use core::f32::consts::PI;
-use core::ops::Range;
 use glam::Vec3;
-use halflight_simd::kernels::shade::BLOCK;
 
 /// The surface that stands for a point: π times its reflected radiance is the irradiance.
-const WHITE: Bsdf = Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE });
+pub(super) const WHITE: Bsdf = Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE });
 static WHITE_MATERIAL: Material = Material::diffuse(Rgb::ONE);
 
 /// Distance within which a free point lies on a surface, in error bounds of both: the point was computed with
@@ -198,152 +180,3 @@ impl IrradiancePoint {
 
 /// Most surfaces within rounding of a point that are tried.
 const MOST_COINCIDENT: usize = 4;
-
-impl<'a, F: Features, E: LightEstimator<F>> PathIntegrator<'a, F, E> {
-    /// Traces `samples` of each of `points` and adds their irradiance in W/m² to `out`, in the order of
-    /// `points`.
-    ///
-    /// # Errors
-    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
-    #[inline(never)]
-    pub fn sample_irradiance(
-        &self,
-        (points, part): (&[IrradiancePoint], LightPart),
-        samples: Range<u32>,
-        wave: usize,
-        scratch: &mut Arena,
-        out: &mut [Pixel],
-    ) -> Result<Counters, OutOfMemory> {
-        let mut arena = scratch.scratch();
-        let most = samples.len().saturating_mul(points.len());
-        let mut wave = PathWave::<E::State, ()>::new(wave.min(most), &mut arena)?;
-        let mut counters = Counters::default();
-        let each = |sample| points.iter().zip(0..).map(move |(point, place)| (point.number, place, sample));
-        let mut all = samples.flat_map(each).peekable();
-        while all.peek().is_some() {
-            let mut count = 0;
-            for (number, place, sample) in all.by_ref().take(wave.wave.paths.len()) {
-                wave.wave.paths[count].begin(number, place, sample, PathClasses::ALL);
-                wave.begin(count, 0);
-                count += 1;
-            }
-            counters.paths += count as u64;
-            self.leave_points((points, part), &mut wave, count, &mut counters);
-            for i in 0..count {
-                let path = wave.wave.paths[i];
-                let Some(pixel) = out.get_mut(path.place as usize) else { continue };
-                if pixel.add(path.sample, wave.radiance(i) * PI, &mut counters.dropped) {
-                    pixel.add_blur(path.sample, Rgb::from(path.blur) * PI);
-                }
-            }
-        }
-        Ok(counters)
-    }
-
-    /// Takes the light samples and the next directions at the points of the first `count` paths, and follows
-    /// the paths to their ends.
-    fn leave_points(
-        &self,
-        (points, part): (&[IrradiancePoint], LightPart),
-        wave: &mut PathWave<E::State, ()>,
-        count: usize,
-        counters: &mut Counters,
-    ) {
-        let most = (self.estimator.light_samples(&self.context) + self.estimator.connections()) as usize;
-        wave.wave.next = 0;
-        let mut found = [E::Found::default(); BLOCK];
-        for i in 0..count {
-            if E::LOOKS_UP_POINTS && i.is_multiple_of(BLOCK) {
-                let block = i..count.min(i + BLOCK);
-                found = self.look_up_points(points, block, wave, counters);
-            }
-            if wave.wave.shadows.count + most > wave.wave.shadows.rays.len() {
-                wave.wave.trace_shadow_rays(&self.context, counters);
-            }
-            let Some(point) = points.get(wave.wave.paths[i].place as usize) else { continue };
-            self.leave_point((&point.surface(), part, found[i % BLOCK]), wave, i, counters);
-        }
-        wave.wave.trace_shadow_rays(&self.context, counters);
-        let count = wave.wave.next;
-        wave.wave.trace(&self.context, count, Coherence::Incoherent, counters);
-        self.trace_to_end(wave, count, counters);
-    }
-
-    /// Looks up the data structure at the points of a block of paths.
-    fn look_up_points(
-        &self,
-        points: &[IrradiancePoint],
-        block: Range<usize>,
-        PathWave { wave, .. }: &mut PathWave<E::State, ()>,
-        counters: &mut Counters,
-    ) -> [E::Found; BLOCK] {
-        let mut surfaces = [None; BLOCK];
-        for (surface, i) in surfaces.iter_mut().zip(block.clone()) {
-            wave.rays[i].tag = i as u32;
-            *surface = points.get(wave.paths[i].place as usize).map(IrradiancePoint::surface);
-        }
-        let mut found = [E::Found::default(); BLOCK];
-        let scene = (&self.context, &self.settings);
-        self.estimator.look_up(scene, (wave, block), &surfaces, &mut found, counters);
-        found
-    }
-
-    /// Light sample and next ray of path `i` at its point, with the light that was `found` there.
-    fn leave_point(
-        &self,
-        (point, part, found): (&SurfacePoint<'a>, LightPart, E::Found),
-        PathWave { wave, memory }: &mut PathWave<E::State, ()>,
-        i: usize,
-        counters: &mut Counters,
-    ) {
-        if self.settings.max_depth < 2 {
-            return;
-        }
-        let mut none = (E::State::zeroed(), ());
-        let path = wave.paths[i];
-        let vertex = PathVertex {
-            path: i,
-            pixel: path.pixel,
-            sample: path.sample,
-            point,
-            bsdf: WHITE,
-            sampler: Sampler::new(self.settings.seed, path.pixel, path.sample),
-            first: dimension::vertex(1),
-            segments: 1,
-            wo: Vec3::Z,
-            normal: point.frame.normal,
-            distance: 0.0,
-            travelled: 0.0,
-            throughput: Rgb::ONE,
-            apart: false,
-            came: path.classes,
-            rest: path.classes,
-        };
-        let Some(Path { path, state, shared }) = memory.path(wave.paths, i, &mut none) else { return };
-        // Photons have the light of surfaces: a path from a free point begins as one from a camera.
-        let is_free = point.triangle == MISS && !E::LOOKS_UP_POINTS;
-        let rest = match is_free {
-            true => RemainingLight::all(&vertex),
-            false => self.known(Path { path, state, shared }, &vertex, found),
-        };
-        let rest = match part {
-            LightPart::All => rest,
-            LightPart::Direct => RemainingLight::of(PathClasses::EMITTED),
-            LightPart::Indirect => {
-                rest.and(RemainingLight { is_lit: true, ..RemainingLight::of(PathClasses::SCATTERED) })
-            }
-        };
-        let state = memory.states.get(i).unwrap_or(&none.0);
-        self.direct((state, &mut ()), &vertex, &rest, wave);
-        if rest.ends {
-            return;
-        }
-        let Some(path) = memory.path(wave.paths, i, &mut none) else { return };
-        if let Some(ray) = self.scatter(path, &vertex, &rest, counters) {
-            wave.push_ray(i, ray);
-        }
-        if let Some(state) = memory.states.get_mut(i).filter(|_| is_free) {
-            *state = E::State::zeroed();
-        }
-    }
-}

@@ -30,7 +30,7 @@ pub fn irradiance(
     let (white, wo) = (Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE }), Vec3::Z);
     let direct = match lights.is_empty() || max_depth < 2 {
         true => Rgb::ZERO,
-        false => light_sample(&context, point, &white, wo, dimension::light_sample(sampler, 1), Rgb::ONE),
+        false => direct_at_start(&context, point, &white, wo, dimension::light_sample(sampler, 1)),
     };
     let [u, v] = dimension::scattering(sampler, 1);
     let Some(scattered) = white.sample::<All>(wo, [u, v, 0.0]) else { return direct * PI };
@@ -47,6 +47,38 @@ pub fn irradiance(
         segments: 2,
     };
     follow(&context, sampler, max_depth, false, (start, direct)) * PI
+}
+
+/// All delta lights at `point` if they are few, and a sample of the other lights by `u`; or a sample of all.
+fn direct_at_start(
+    context: &SceneContext<All>,
+    point: &SurfacePoint,
+    bsdf: &Bsdf,
+    wo: Vec3,
+    u: [f32; 3],
+) -> Rgb {
+    let (scene, lights) = (context.scene, context.lights);
+    let count = lights.few_delta_lights();
+    if count == 0 {
+        return light_sample(context, point, bsdf, wo, u, Rgb::ONE);
+    }
+    let mut direct = Rgb::ZERO;
+    for light in (0..count).filter_map(|index| lights.delta_light(scene, index, point.position)) {
+        let wi = point.frame.to_local(light.direction);
+        let (f, _) = bsdf.evaluate::<All>(wo, wi);
+        if point.sides_agree(wi, light.direction) && f != Rgb::ZERO {
+            let ray = context.shadow_ray(point, &light);
+            let arriving = ray.and_then(|ray| context.transmit(ray, f * light.radiance, &mut 0));
+            direct += arriving.unwrap_or_default();
+        }
+    }
+    let mut others = *context;
+    others.lights = lights.without_delta_lights();
+    if others.lights.is_empty() {
+        return direct;
+    }
+    let left = Rgb::splat(others.lights.fraction_left(point.position, point.frame.normal));
+    direct + light_sample(&others, point, bsdf, wo, u, left)
 }
 
 /// Ray of a path, and the vertex at its origin.

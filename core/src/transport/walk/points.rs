@@ -208,8 +208,19 @@ impl<'a> PointBlock<'a> {
         }
     }
 
-    /// Stores a surface point computed without lanes.
+    /// Stores a surface point computed without lanes, viewed along `direction`.
     fn put_point(&mut self, i: usize, point: &SurfacePoint, direction: Vec3) {
+        self.put_viewed(i, point, point.frame.to_local(-direction));
+    }
+
+    /// Stores a surface point and its triangle, viewed along the normal.
+    pub(crate) fn put_at_normal(&mut self, i: usize, point: &SurfacePoint) {
+        self.triangle[i & 15] = point.triangle;
+        self.put_viewed(i, point, Vec3::Z);
+    }
+
+    /// Stores a surface point that is viewed from `wo`.
+    fn put_viewed(&mut self, i: usize, point: &SurfacePoint, wo: Vec3) {
         let surface = &mut self.surface;
         put(&mut surface.position, i, point.position.to_array());
         surface.error[i & 15] = point.error;
@@ -218,7 +229,7 @@ impl<'a> PointBlock<'a> {
         for (rows, axis) in surface.frame.iter_mut().zip([tangent, bitangent, normal]) {
             put(rows, i, axis.to_array());
         }
-        put(&mut surface.wo, i, point.frame.to_local(-direction).to_array());
+        put(&mut surface.wo, i, wo.to_array());
         surface.front = surface.front & !(1 << i) | u32::from(point.front) << i;
         self.attributes[i & 15] = point.attributes;
     }

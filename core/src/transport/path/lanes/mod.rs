@@ -7,6 +7,7 @@
 //! levels without lanes. Both compute the same bits.
 
 mod direct;
+mod points;
 mod scatter;
 
 use super::PathIntegrator;

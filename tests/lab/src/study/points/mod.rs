@@ -70,7 +70,7 @@ struct Built<'a> {
     lights: LightSampler<'a>,
 }
 
-const HEAD: &str = "scene             spp   pooled: held  worst tenth  width   samples: held  worst   replicates: held  worst";
+const HEAD: &str = "scene             spp   pooled: held  worst tenth  region  width   samples: held  worst   replicates: held  worst";
 
 impl Points {
     pub(super) fn run(&self, output: &mut Output) -> Result<()> {
@@ -115,7 +115,7 @@ impl Points {
         if points.len() < 64 {
             return Err(format!("{}: the camera sees too few lit points", path.display()).into());
         }
-        let mut coverages: Vec<_> = self.spp.iter().map(|_| Coverage::new(&truth)).collect();
+        let mut coverages: Vec<_> = self.spp.iter().map(|_| Coverage::new(&truth, &points)).collect();
         for seed in 0..self.seeds {
             let mut samples = Samples::new(points.len());
             self.bake(&built, &points, (seed, self.method()), &mut executor, &mut |renderer, executor| {
