@@ -27,6 +27,7 @@ mod irradiance_gaps;
 mod irradiance_rooms;
 mod lamp_borders;
 mod lamp_cutouts;
+mod left_over_memory;
 mod light_area;
 mod light_kinds;
 mod light_many;

@@ -47,6 +47,8 @@ impl<'m> Tree<'m> {
         while waiting > 0 {
             waiting -= 1;
             let work = stack[waiting];
+            // Memory may be left over from an earlier use: groups without lights have no power.
+            nodes[work.node] = Node::zeroed();
             for (lane, (start, end)) in work.parts(items).into_iter().enumerate() {
                 let part = &items[start..end];
                 if part.is_empty() {

@@ -22,7 +22,9 @@ fn items(count: u32, place: impl Fn(&Random, u32) -> Vec3) -> Vec<Item> {
 
 fn with_tree(mut items: Vec<Item>, then: impl FnOnce(&Tree, usize)) {
     let count = items.len();
-    let mut lines = vec![Line([0; 64]); Tree::footprint(count).bytes() / 64];
+    // Left over from an earlier use: groups without lights would have a power of 1.
+    let left_over = Line(bytemuck::cast([1.0f32; 16]));
+    let mut lines = vec![left_over; Tree::footprint(count).bytes() / 64];
     let (nodes, trails) = Tree::memory(count, &mut Arena::over(&mut lines)).unwrap();
     then(&Tree::build(&mut items, nodes, trails), count);
 }
