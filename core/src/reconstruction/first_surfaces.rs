@@ -170,8 +170,8 @@ impl<'a, F: Features> FirstSurfaces<'a, F> {
         Ok(counters)
     }
 
-    /// Second pass: fractions of the clusters of pixels at edges, which `rims` marks, by `rays` rays. It leaves
-    /// the marks of the rims of lamps.
+    /// Second pass: fractions of the clusters of pixels at edges, which `rims` marks, by `rays` rays. It
+    /// leaves the marks of the rims of lamps.
     #[inline(never)]
     fn refine_band(
         &self,

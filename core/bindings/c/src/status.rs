@@ -54,7 +54,9 @@ impl HalflightStatus {
             Self::Texture => c"a texture has no texel, or texels that are not aligned to their type",
             Self::Light => c"a light has a kind that does not exist, or the environment such a texture",
             Self::Size => c"a picture has 1 to 2^28 pixels, and there are 1 to 2^30 points",
-            Self::Setting => c"a setting or a field of view has a value that it cannot have, or a count is too large",
+            Self::Setting => {
+                c"a setting or a field of view has a value that it cannot have, or a count is too large"
+            }
         }
     }
 }
