@@ -16,12 +16,19 @@ pub(crate) fn c(project: &Project) -> Outcome {
         return Err(Failure::Missing("no C compiler: apt-get install gcc".to_owned()));
     }
     let folder = project.root.join("core/bindings/c");
+    test(project, &folder, "")?;
+    Ok(format!("header, programs in C and C++, {}", installed(project, &folder)?))
+}
+
+/// Builds the library, which the tests link, and runs those whose names have `filter`.
+fn test(project: &Project, folder: &Path, filter: &str) -> Result<(), Failure> {
     for line in
         ["cargo build --profile quick --locked --quiet", "cargo test --profile quick --locked --quiet"]
     {
-        run(command(&folder, line).env("CARGO_TARGET_DIR", project.root.join("target")))?;
+        let filter = Some(filter).filter(|filter| !filter.is_empty() && line.contains("test"));
+        run(command(folder, line).args(filter).env("CARGO_TARGET_DIR", project.root.join("target")))?;
     }
-    Ok(format!("header, programs in C and C++, {}", installed(project, &folder)?))
+    Ok(())
 }
 
 /// Installs the library into an empty prefix, and runs a program that is compiled by its file for pkg-config.
@@ -59,8 +66,7 @@ pub(crate) fn web(project: &Project) -> Outcome {
     let built = folder.join("target").join(WEB).join("web/halflight.wasm");
     let module = project.root.join("core/bindings/wasm/halflight.wasm");
     let bytes = fs::copy(built, &module).map_err(io)?;
-    let line = "cargo test --profile quick --locked --quiet web";
-    run(command(&folder, line).env("CARGO_TARGET_DIR", project.root.join("target")))?;
+    test(project, &folder, "web")?;
     package(project)?;
     let line =
         "cargo test --profile quick --locked --quiet -p halflight-tests --test main web_page:: -- --ignored";
