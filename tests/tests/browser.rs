@@ -1,7 +1,9 @@
 //! Headless browser for tests of the report page: opening, scripts that probe the document, and their notes.
 
+use core::time::Duration;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::mpsc::Receiver;
 
 /// The installed browser; without one, a message that the test is skipped.
 pub(crate) fn browser() -> Option<&'static str> {
@@ -66,6 +68,23 @@ pub(crate) fn opened_at(
     let said = String::from_utf8_lossy(&output.stderr);
     let console = said.lines().filter(|line| line.contains("CONSOLE")).map(String::from).collect();
     (console, String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// The first message that the page at `address` posts; the browser ends then.
+pub(crate) fn answer(browser: &str, folder: &Path, address: &str, posted: &Receiver<String>) -> String {
+    let mut child = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
+        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
+        .arg(address)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // A page that does not answer for so long never does.
+    let answer = posted.recv_timeout(Duration::from_secs(900));
+    let _ = child.kill();
+    let _ = child.wait();
+    answer.expect("the page answers")
 }
 
 /// Script that runs once the page is ready, with helpers; `note(name, value)` adds a line to the document.

